@@ -1,0 +1,374 @@
+//! The layout of an Arrow IPC file, checked before anything is decoded.
+//!
+//! Arrow's own reader trusts offsets, lengths and types that a damaged file can
+//! get wrong, and may then panic or allocate without bound. Here every number is
+//! held against the file's true size and against the trace's schema first; what
+//! is left for decoding are byte ranges known to lie in the file and lengths
+//! known to fit them. Only the flatbuffer accessors, behind their verifier, are
+//! Arrow's.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use arrow_buffer::Buffer;
+use arrow_ipc::{
+    CompressionType, Endianness, KeyValue, MetadataVersion, Precision, Type, root_as_footer,
+    root_as_message,
+};
+
+use crate::error::{Error, Result};
+use crate::trace::batch::MAX_BATCH_ROWS;
+use crate::trace::column::{ColumnId, ValueType};
+use crate::trace::seal::damaged;
+
+const MAGIC: &[u8; 6] = b"ARROW1";
+const CONTINUATION: [u8; 4] = [0xff; 4];
+/// The magic at the end and the footer's length before it.
+const TAIL_BYTES: usize = MAGIC.len() + 4;
+/// Writers pad the head to at most this alignment.
+const MAX_ALIGNMENT: usize = 64;
+
+/// What the head and the footer of a file say.
+#[derive(Debug)]
+pub(crate) struct Layout {
+    /// The schema's metadata.
+    pub metadata: BTreeMap<String, String>,
+    /// The columns that are stored, in file order.
+    pub columns: Vec<(ColumnId, ValueType)>,
+    /// Where the first record batch begins.
+    pub head_end: u64,
+    /// The record batches: contiguous from `head_end`.
+    pub blocks: Vec<Block>,
+    /// The footer's own metadata.
+    pub footer_metadata: BTreeMap<String, String>,
+}
+
+/// Where one record batch lies in the file.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Block {
+    pub offset: u64,
+    pub message_bytes: usize,
+    pub body_bytes: usize,
+}
+
+impl Block {
+    pub fn bytes(&self) -> usize {
+        self.message_bytes + self.body_bytes
+    }
+
+    pub fn end(&self) -> u64 {
+        self.offset + self.bytes() as u64
+    }
+}
+
+fn not_a_trace(place: &str, what: impl std::fmt::Display) -> Error {
+    Error::invalid(place, what, "give a trace written by 'screendoor capture'")
+}
+
+impl Layout {
+    /// Reads the layout of the file whose bytes are `file`.
+    pub fn parse(file: &[u8], place: &str) -> Result<Self> {
+        if file.len() < MAGIC.len() || &file[..MAGIC.len()] != MAGIC {
+            return Err(not_a_trace(place, "it is not an Arrow IPC file"));
+        }
+        if file.len() < 2 * MAX_ALIGNMENT || &file[file.len() - MAGIC.len()..] != MAGIC {
+            return Err(damaged(place, "its end is missing (truncated)"));
+        }
+        let tail = file.len() - TAIL_BYTES;
+        let footer_bytes = read_i32(file, tail);
+        let footer_start = usize::try_from(footer_bytes)
+            .ok()
+            .and_then(|n| tail.checked_sub(n))
+            .filter(|start| *start >= MAGIC.len())
+            .ok_or_else(|| damaged(place, "its footer's length does not fit the file"))?;
+        let footer = root_as_footer(&file[footer_start..tail])
+            .map_err(|e| damaged(place, format_args!("its footer cannot be read ({e})")))?;
+        check_version(footer.version(), place)?;
+        if footer.dictionaries().is_some_and(|d| !d.is_empty()) {
+            return Err(not_a_trace(place, "it has dictionary-encoded columns"));
+        }
+        let schema = footer.schema().ok_or_else(|| damaged(place, "its footer has no schema"))?;
+        let (metadata, columns) = read_schema(schema, place)?;
+
+        let (head, head_end) = read_head(file, footer_start, place)?;
+        if read_schema(head, place)? != (metadata.clone(), columns.clone()) {
+            return Err(damaged(place, "the schemas of its head and its footer differ"));
+        }
+
+        let mut blocks = Vec::new();
+        let mut end = head_end as u64;
+        for (i, block) in footer.recordBatches().iter().flatten().enumerate() {
+            let sizes = (
+                u64::try_from(block.offset()),
+                usize::try_from(block.metaDataLength()),
+                usize::try_from(block.bodyLength()),
+            );
+            let (Ok(offset), Ok(message_bytes), Ok(body_bytes)) = sizes else {
+                return Err(damaged(place, format_args!("batch {i} has a negative extent")));
+            };
+            let limit = footer_start as u64;
+            let fits = (message_bytes as u64)
+                .checked_add(body_bytes as u64)
+                .and_then(|n| offset.checked_add(n))
+                .is_some_and(|e| e <= limit);
+            if !fits || offset != end || message_bytes < 8 {
+                return Err(damaged(
+                    place,
+                    format_args!("batch {i} does not begin where the one before it ends"),
+                ));
+            }
+            let block = Block { offset, message_bytes, body_bytes };
+            end = block.end();
+            blocks.push(block);
+        }
+        // After the last batch stands the end-of-stream marker, or nothing.
+        let rest = &file[end as usize..footer_start];
+        let marker = [CONTINUATION, [0; 4]].concat();
+        if !(rest.is_empty() || rest == [0; 4] || rest == marker) {
+            return Err(damaged(place, "there are stray bytes after its last batch"));
+        }
+        let footer_metadata = key_values(footer.custom_metadata().iter().flatten(), place)?;
+        Ok(Layout { metadata, columns, head_end: head_end as u64, blocks, footer_metadata })
+    }
+}
+
+/// The schema message at the file's head and the offset at which it ends.
+fn read_head<'a>(
+    file: &'a [u8],
+    limit: usize,
+    place: &str,
+) -> Result<(arrow_ipc::Schema<'a>, usize)> {
+    let bad = || damaged(place, "the schema at its head cannot be read");
+    // The magic is padded with zeros to the writer's alignment.
+    let start = (8..=MAX_ALIGNMENT)
+        .step_by(8)
+        .find(|at| file.get(*at..*at + 4) == Some(&CONTINUATION))
+        .filter(|at| file[MAGIC.len()..*at].iter().all(|b| *b == 0))
+        .ok_or_else(bad)?;
+    let (message, end) = read_message(file, start, limit).ok_or_else(bad)?;
+    let message = root_as_message(message).map_err(|_| bad())?;
+    check_version(message.version(), place)?;
+    Ok((message.header_as_schema().ok_or_else(bad)?, end))
+}
+
+/// The flatbuffer of the encapsulated message at `start` and where it ends.
+fn read_message(file: &[u8], start: usize, limit: usize) -> Option<(&[u8], usize)> {
+    if start + 8 > limit || file[start..start + 4] != CONTINUATION {
+        return None;
+    }
+    let length = usize::try_from(read_i32(file, start + 4)).ok()?;
+    let end = (start + 8).checked_add(length).filter(|end| *end <= limit)?;
+    Some((&file[start + 8..end], end))
+}
+
+fn read_i32(bytes: &[u8], at: usize) -> i32 {
+    i32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"))
+}
+
+fn check_version(version: MetadataVersion, place: &str) -> Result<()> {
+    if version == MetadataVersion::V5 || version == MetadataVersion::V4 {
+        return Ok(());
+    }
+    Err(Error::unsupported(
+        place,
+        format_args!("Arrow metadata version {version:?}"),
+        "write it with version 4 or 5 of the Arrow format",
+    ))
+}
+
+type Schema = (BTreeMap<String, String>, Vec<(ColumnId, ValueType)>);
+
+fn read_schema(schema: arrow_ipc::Schema<'_>, place: &str) -> Result<Schema> {
+    if schema.endianness() != Endianness::Little {
+        return Err(Error::unsupported(place, "it is big-endian", "write it little-endian"));
+    }
+    let metadata = key_values(schema.custom_metadata().iter().flatten(), place)?;
+    let mut columns: Vec<(ColumnId, ValueType)> = Vec::new();
+    for field in schema.fields().iter().flatten() {
+        let name = field.name().unwrap_or("");
+        let Some(id) = ColumnId::ALL.into_iter().find(|id| id.name() == name) else {
+            return Err(not_a_trace(place, format_args!("'{name}' is no column of a trace")));
+        };
+        if columns.last().is_some_and(|(last, _)| *last >= id) {
+            let what = format_args!("the column '{name}' stands out of order or twice").to_string();
+            return Err(not_a_trace(place, what));
+        }
+        let value_type =
+            value_type(field).filter(|_| field.dictionary().is_none()).ok_or_else(|| {
+                not_a_trace(place, format_args!("column '{name}' has a type that no trace has"))
+            })?;
+        columns.push((id, value_type));
+    }
+    Ok((metadata, columns))
+}
+
+fn value_type(field: arrow_ipc::Field<'_>) -> Option<ValueType> {
+    match field.type_type() {
+        Type::Int => {
+            let int = field.type_as_int()?;
+            Some(match (int.is_signed(), int.bitWidth()) {
+                (false, 8) => ValueType::U8,
+                (false, 16) => ValueType::U16,
+                (false, 32) => ValueType::U32,
+                (false, 64) => ValueType::U64,
+                (true, 32) => ValueType::I32,
+                _ => return None,
+            })
+        }
+        Type::FloatingPoint => match field.type_as_floating_point()?.precision() {
+            Precision::HALF => Some(ValueType::F16),
+            Precision::SINGLE => Some(ValueType::F32),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+fn key_values<'a>(
+    pairs: impl Iterator<Item = KeyValue<'a>>,
+    place: &str,
+) -> Result<BTreeMap<String, String>> {
+    let mut map = BTreeMap::new();
+    for pair in pairs {
+        let (Some(key), Some(value)) = (pair.key(), pair.value()) else {
+            return Err(damaged(place, "its metadata has an entry without key or value"));
+        };
+        if map.insert(key.to_string(), value.to_string()).is_some() {
+            return Err(damaged(place, format_args!("its metadata has '{key}' twice")));
+        }
+    }
+    Ok(map)
+}
+
+/// One record batch's message: where its columns' bytes lie within its body.
+#[derive(Debug)]
+pub(crate) struct BatchLayout {
+    pub rows: usize,
+    columns: Vec<(ColumnId, ValueType, Range<usize>)>,
+    compression: Option<CompressionType>,
+}
+
+impl BatchLayout {
+    /// Reads and checks the message of a block, whose bytes are `bytes`, against
+    /// the file's `columns`.
+    pub fn parse(
+        bytes: &[u8],
+        block: &Block,
+        columns: &[(ColumnId, ValueType)],
+        place: &str,
+    ) -> Result<Self> {
+        let bad = |what: &str| damaged(place, what);
+        let (message, end) = read_message(bytes, 0, block.message_bytes)
+            .ok_or_else(|| bad("its message is cut off"))?;
+        if block.message_bytes - end >= MAX_ALIGNMENT {
+            return Err(bad("its message is shorter than its block says"));
+        }
+        let message = root_as_message(message).map_err(|_| bad("its message cannot be read"))?;
+        check_version(message.version(), place)?;
+        if usize::try_from(message.bodyLength()).ok() != Some(block.body_bytes) {
+            return Err(bad("its body's length differs from the footer's"));
+        }
+        let batch =
+            message.header_as_record_batch().ok_or_else(|| bad("it is not a record batch"))?;
+        let rows = usize::try_from(batch.length())
+            .ok()
+            .filter(|rows| *rows <= MAX_BATCH_ROWS)
+            .ok_or_else(|| {
+                Error::invalid(
+                    place,
+                    format_args!("it claims {} rows", batch.length()),
+                    format_args!("a batch holds at most {MAX_BATCH_ROWS}: write smaller ones"),
+                )
+            })?;
+        let compression = match batch.compression() {
+            None => None,
+            Some(c) => Some(c.codec()),
+        };
+        let nodes: Vec<_> = batch.nodes().iter().flatten().collect();
+        let buffers: Vec<_> = batch.buffers().iter().flatten().collect();
+        if nodes.len() != columns.len() || buffers.len() != 2 * columns.len() {
+            return Err(bad("it does not have the file's columns"));
+        }
+        let mut found = Vec::with_capacity(columns.len());
+        for (i, (id, value_type)) in columns.iter().enumerate() {
+            let name = id.name();
+            let bad = |what: &str| bad(&format!("its column '{name}' {what}"));
+            if usize::try_from(nodes[i].length()).ok() != Some(rows) {
+                return Err(bad("has another length"));
+            }
+            if nodes[i].null_count() != 0 {
+                return Err(bad("has nulls"));
+            }
+            let buffer = buffers[2 * i + 1];
+            let range = usize::try_from(buffer.offset())
+                .ok()
+                .zip(usize::try_from(buffer.length()).ok())
+                .and_then(|(start, n)| Some(start..start.checked_add(n)?))
+                .filter(|range| range.end <= block.body_bytes)
+                .ok_or_else(|| bad("lies outside the batch"))?;
+            if compression.is_none() && range.len() < rows * value_type.bytes() {
+                return Err(bad("is too short"));
+            }
+            found.push((*id, *value_type, range));
+        }
+        Ok(BatchLayout { rows, columns: found, compression })
+    }
+
+    /// The bytes of `column`'s values, decompressed where they are compressed;
+    /// `None` where the file does not store it. At least `rows` values long.
+    pub fn values(
+        &self,
+        column: ColumnId,
+        block: &Buffer,
+        message_bytes: usize,
+        place: &str,
+    ) -> Result<Option<(ValueType, Buffer)>> {
+        let Some((_, value_type, range)) = self.columns.iter().find(|c| c.0 == column) else {
+            return Ok(None);
+        };
+        let stored = block.slice_with_length(message_bytes + range.start, range.len());
+        let wanted = self.rows * value_type.bytes();
+        let bad =
+            |what: &str| damaged(place, format_args!("its column '{}' {what}", column.name()));
+        let Some(codec) = self.compression.filter(|_| wanted > 0) else {
+            return Ok(Some((*value_type, stored)));
+        };
+        // A compressed buffer begins with its decompressed length, −1 for a buffer
+        // that is stored as it is.
+        let length = stored.get(..8).ok_or_else(|| bad("is too short"))?;
+        let length = i64::from_le_bytes(length.try_into().expect("eight bytes"));
+        let payload = stored.slice(8);
+        let values = if length == -1 {
+            payload
+        } else {
+            let fits = usize::try_from(length)
+                .is_ok_and(|n| (wanted..wanted + MAX_ALIGNMENT).contains(&n));
+            if !fits {
+                return Err(bad("claims another length than its rows take"));
+            }
+            let bytes = decompress(codec, &payload, length as usize)
+                .ok_or_else(|| bad("cannot be decompressed"))?;
+            Buffer::from_vec(bytes)
+        };
+        if values.len() < wanted {
+            return Err(bad("is too short"));
+        }
+        Ok(Some((*value_type, values)))
+    }
+}
+
+/// Decompresses `bytes` to exactly `length` bytes, and never to more.
+fn decompress(codec: CompressionType, bytes: &[u8], length: usize) -> Option<Vec<u8>> {
+    use std::io::Read;
+    match codec {
+        CompressionType::ZSTD => zstd::bulk::decompress(bytes, length).ok(),
+        CompressionType::LZ4_FRAME => {
+            let mut output = Vec::with_capacity(length);
+            let mut decoder = lz4_flex::frame::FrameDecoder::new(bytes).take(length as u64 + 1);
+            decoder.read_to_end(&mut output).ok()?;
+            Some(output)
+        }
+        _ => None,
+    }
+    .filter(|output| output.len() == length)
+}

@@ -1,0 +1,29 @@
+//! The trace: a recorded stream of fragments, and its file.
+//!
+//! A trace is what a rasteriser hands to the raster-operations unit, in API
+//! order: one [`Fragment`] for each primitive and pixel, with its coverage, its
+//! depth plane, its colour and its alpha. It lives in an Arrow IPC file
+//! (`docs/TRACE_FORMAT.md`); [`TraceWriter`] and [`Trace`] stream it batch by
+//! batch, so that neither side ever holds the whole.
+
+#[cfg(target_endian = "big")]
+compile_error!("traces are little-endian and are read without conversion");
+
+mod batch;
+mod column;
+mod content;
+mod fragment;
+mod header;
+mod layout;
+mod read;
+mod seal;
+mod stats;
+mod write;
+
+pub use batch::{Batch, MAX_BATCH_ROWS};
+pub use column::{ChannelColumn, Column, ColumnId, CoverageColumn, Native, Scalar, ValueType};
+pub use fragment::{DepthPlane, Fragment, MAX_SAMPLES, SampleMask, Unorm32};
+pub use header::{ColourFormat, FORMAT_VERSION, Header, MAX_SIDE, SamplePattern};
+pub use read::Trace;
+pub use stats::{Statistics, statistics};
+pub use write::{Compression, TraceWriter, WriteOptions, Written};

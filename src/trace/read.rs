@@ -1,0 +1,311 @@
+//! Reading a trace, batch by batch.
+
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use arrow_buffer::Buffer;
+use bytes::Bytes;
+use memmap2::MmapOptions;
+
+use crate::error::{Error, Result};
+use crate::trace::batch::{Batch, Source};
+use crate::trace::column::{ColumnId, ValueType};
+use crate::trace::content::ContentHasher;
+use crate::trace::header::{ColourFormat, Header};
+use crate::trace::layout::{BatchLayout, Block, Layout};
+use crate::trace::seal::{CHECKSUMS, CHECKSUMS_KIND, Seal, damaged};
+
+/// A trace that is open for reading. Cloning shares it.
+///
+/// Opening reads the head and the footer; batches are mapped and checked when
+/// they are asked for and unmapped when dropped, so that memory is bounded by
+/// the batches in use. The file must not change while it is open: a file that
+/// another program shortens under a memory map ends the process, as with any
+/// memory map.
+#[derive(Clone, Debug)]
+pub struct Trace {
+    inner: Arc<Inner>,
+}
+
+#[derive(Debug)]
+struct Inner {
+    place: String,
+    storage: Storage,
+    header: Header,
+    columns: Vec<(ColumnId, ValueType)>,
+    blocks: Vec<Block>,
+    block_rows: Vec<u64>,
+    rows: u64,
+    seal: Option<Seal>,
+}
+
+#[derive(Debug)]
+enum Storage {
+    File(File),
+    Memory(Bytes),
+}
+
+impl Storage {
+    /// The bytes at `offset`, mapped or shared, never copied.
+    fn bytes(&self, place: &str, offset: u64, length: usize) -> Result<Bytes> {
+        match self {
+            Storage::Memory(bytes) => {
+                let start = offset as usize;
+                Ok(bytes.slice(start..start + length))
+            }
+            Storage::File(_) if length == 0 => Ok(Bytes::new()),
+            Storage::File(file) => {
+                let mut options = MmapOptions::new();
+                options.offset(offset).len(length).populate();
+                // SAFETY: the map is read-only. Another process that changes the file
+                // could change bytes behind the slice; the type's documentation
+                // forbids that, as there is no way to prevent it.
+                let map = unsafe { options.map(file) };
+                let map = map.map_err(|e| Error::io("read", place, e))?;
+                Ok(Bytes::from_owner(map))
+            }
+        }
+    }
+}
+
+impl Trace {
+    /// Opens the trace at `path`.
+    ///
+    /// # Errors
+    /// [`Error::Io`] where it cannot be read, [`Error::Invalid`] where it is
+    /// damaged or no trace, [`Error::Unsupported`] for a newer format.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self> {
+        let path: PathBuf = path.as_ref().to_path_buf();
+        let fail = |source| Error::io("read", &path, source);
+        let metadata = std::fs::metadata(&path).map_err(fail)?;
+        if !metadata.is_file() {
+            return Err(Error::config(
+                format_args!("cannot read {}: it is no regular file", path.display()),
+                "name a trace file",
+            ));
+        }
+        let file = File::open(&path).map_err(fail)?;
+        let length = usize::try_from(metadata.len()).map_err(|_| {
+            Error::unsupported(path.display(), "the file is too large", "use a 64-bit machine")
+        })?;
+        Self::read(path.display().to_string(), Storage::File(file), length)
+    }
+
+    /// Reads the trace whose file's bytes are `bytes`; `place` names it in errors.
+    ///
+    /// # Errors
+    /// As [`Trace::open`].
+    pub fn from_bytes(bytes: impl Into<Bytes>, place: &str) -> Result<Self> {
+        let bytes = bytes.into();
+        let length = bytes.len();
+        Self::read(place.to_string(), Storage::Memory(bytes), length)
+    }
+
+    fn read(place: String, storage: Storage, length: usize) -> Result<Self> {
+        let file = match &storage {
+            Storage::Memory(bytes) => bytes.clone(),
+            // Without populating: only the head and the footer are touched.
+            Storage::File(_) if length == 0 => Bytes::new(),
+            Storage::File(file) => {
+                // SAFETY: as in `Storage::bytes`.
+                let map = unsafe { MmapOptions::new().len(length).map(file) };
+                Bytes::from_owner(map.map_err(|e| Error::io("read", &place, e))?)
+            }
+        };
+        let layout = Layout::parse(&file, &place)?;
+        let mut header = Header::from_metadata(&layout.metadata, &place)?;
+        complete(&mut header, &layout, &place)?;
+
+        let seal = match layout.metadata.get(CHECKSUMS).map(String::as_str) {
+            Some(CHECKSUMS_KIND) => {
+                let seal = Seal::from_metadata(&layout.footer_metadata, &place)?;
+                let ends =
+                    std::iter::once(layout.head_end).chain(layout.blocks.iter().map(Block::end));
+                if !ends.eq(seal.blocks.iter().map(|b| b.end)) {
+                    return Err(damaged(&place, "its batches do not lie where its seal says"));
+                }
+                let head = &file[..layout.head_end as usize];
+                check_crc(head, seal.blocks[0].crc, &format!("{place}, head"))?;
+                Some(seal)
+            }
+            Some(other) => {
+                return Err(Error::unsupported(
+                    &place,
+                    format_args!("checksums of kind '{other}' are unknown"),
+                    format_args!("write the file with {CHECKSUMS}={CHECKSUMS_KIND} or without"),
+                ));
+            }
+            None => None,
+        };
+        let block_rows = match &seal {
+            Some(seal) => seal.blocks[1..].iter().map(|b| b.rows).collect(),
+            // Another program's file: the batches' own messages say.
+            None => {
+                let mut rows = Vec::with_capacity(layout.blocks.len());
+                for (i, block) in layout.blocks.iter().enumerate() {
+                    let bytes = &file[block.offset as usize..][..block.message_bytes];
+                    let place = batch_place(&place, i, block);
+                    rows.push(
+                        BatchLayout::parse(bytes, block, &layout.columns, &place)?.rows as u64,
+                    );
+                }
+                rows
+            }
+        };
+        let rows = block_rows.iter().sum();
+        let inner = Inner {
+            place,
+            storage,
+            header,
+            columns: layout.columns,
+            blocks: layout.blocks,
+            block_rows,
+            rows,
+            seal,
+        };
+        Ok(Trace { inner: Arc::new(inner) })
+    }
+
+    /// What the trace says about itself.
+    pub fn header(&self) -> &Header {
+        &self.inner.header
+    }
+
+    /// The file's name, or the name given to [`Trace::from_bytes`].
+    pub fn place(&self) -> &str {
+        &self.inner.place
+    }
+
+    /// How many fragments it holds.
+    pub fn rows(&self) -> u64 {
+        self.inner.rows
+    }
+
+    /// Whether its blocks carry checksums; only files of other programs do not.
+    pub fn is_sealed(&self) -> bool {
+        self.inner.seal.is_some()
+    }
+
+    /// The content hash that it was written with; `None` where it is not sealed.
+    pub fn content(&self) -> Option<&str> {
+        self.inner.seal.as_ref().map(|s| s.content.as_str())
+    }
+
+    /// How many batches it holds.
+    pub fn batch_count(&self) -> usize {
+        self.inner.blocks.len()
+    }
+
+    /// How many fragments batch `i` holds.
+    ///
+    /// # Panics
+    /// Where `i` is not below [`Trace::batch_count`].
+    pub fn batch_rows(&self, i: usize) -> u64 {
+        self.inner.block_rows[i]
+    }
+
+    /// Batch `i`: its checksum is checked, then its structure, then its values.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] where any of it is damaged, [`Error::Io`] where it
+    /// cannot be read.
+    ///
+    /// # Panics
+    /// Where `i` is not below [`Trace::batch_count`].
+    pub fn batch(&self, i: usize) -> Result<Batch> {
+        let inner = &*self.inner;
+        let block = &inner.blocks[i];
+        let place = batch_place(&inner.place, i, block);
+        let bytes = inner.storage.bytes(&inner.place, block.offset, block.bytes())?;
+        if let Some(seal) = &inner.seal {
+            check_crc(&bytes, seal.blocks[i + 1].crc, &place)?;
+        }
+        let layout = BatchLayout::parse(&bytes, block, &inner.columns, &place)?;
+        if layout.rows as u64 != inner.block_rows[i] {
+            return Err(damaged(&place, "its row count differs from the seal's"));
+        }
+        let bytes = Buffer::from(bytes);
+        let batch = Batch::assemble(layout.rows, |id| {
+            Ok(match layout.values(id, &bytes, block.message_bytes, &place)? {
+                Some((value_type, values)) => Source::Bytes(value_type, values),
+                None => Source::Constant(inner.header.constants[&id]),
+            })
+        })?;
+        batch.check(&inner.header, &place)?;
+        Ok(batch)
+    }
+
+    /// All batches in order.
+    pub fn batches(&self) -> impl Iterator<Item = Result<Batch>> + '_ {
+        (0..self.batch_count()).map(|i| self.batch(i))
+    }
+
+    /// Reads the whole trace and compares its content with the hash it was
+    /// written with. Returns the hash.
+    ///
+    /// # Errors
+    /// As [`Trace::batch`]; [`Error::Invalid`] where the hashes differ.
+    pub fn verify(&self, mut progress: impl FnMut(u64)) -> Result<String> {
+        let mut hasher = ContentHasher::new(self.header());
+        for batch in self.batches() {
+            let batch = batch?;
+            hasher.update(&batch);
+            progress(batch.len() as u64);
+        }
+        let hash = hasher.finish(self.rows());
+        match self.content() {
+            Some(written) if written != hash => Err(damaged(
+                self.place(),
+                format_args!("its content's hash is {hash} and was {written} when written"),
+            )),
+            _ => Ok(hash),
+        }
+    }
+}
+
+fn batch_place(place: &str, i: usize, block: &Block) -> String {
+    format!("{place}, batch {i} (bytes {}..{})", block.offset, block.end())
+}
+
+fn check_crc(bytes: &[u8], stored: u32, place: &str) -> Result<()> {
+    let found = crc32fast::hash(bytes);
+    if found == stored {
+        return Ok(());
+    }
+    let what =
+        format_args!("its checksum is {found:08x} and was {stored:08x} when written").to_string();
+    Err(damaged(place, what))
+}
+
+/// Holds the stored columns against the header: each column is stored with a
+/// type it may have, or is constant, and not both.
+fn complete(header: &mut Header, layout: &Layout, place: &str) -> Result<()> {
+    let samples = header.pattern.samples();
+    for id in ColumnId::ALL {
+        let name = id.name();
+        let hint = "correct the writer of the trace (docs/TRACE_FORMAT.md)";
+        let stored = layout.columns.iter().find(|c| c.0 == id).map(|c| c.1);
+        match (stored, header.constants.contains_key(&id)) {
+            (Some(value_type), false) if id.accepts(value_type, samples) => {}
+            (Some(value_type), false) => {
+                let what = format_args!("the column '{name}' cannot be {value_type}").to_string();
+                return Err(Error::invalid(place, what, hint));
+            }
+            (None, true) => {}
+            (Some(_), true) => {
+                let what = format_args!("'{name}' is both a column and a constant").to_string();
+                return Err(Error::invalid(place, what, hint));
+            }
+            (None, false) => {
+                let what = format_args!("the column '{name}' is missing").to_string();
+                return Err(Error::invalid(place, what, hint));
+            }
+        }
+    }
+    let single = [ColumnId::R, ColumnId::G, ColumnId::B]
+        .iter()
+        .any(|id| layout.columns.contains(&(*id, ValueType::F32)));
+    header.colour = if single { ColourFormat::F32 } else { ColourFormat::F16 };
+    Ok(())
+}

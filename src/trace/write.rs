@@ -1,0 +1,184 @@
+//! Writing a trace, fragment by fragment, in bounded memory.
+
+use std::io::Write;
+use std::path::Path;
+
+use arrow_ipc::CompressionType;
+use arrow_ipc::writer::{FileWriter, IpcWriteOptions};
+use arrow_schema::{ArrowError, SchemaRef};
+
+use crate::error::{Error, Result};
+use crate::output::OutputFile;
+use crate::trace::batch::{BatchBuilder, MAX_BATCH_ROWS, schema};
+use crate::trace::content::ContentHasher;
+use crate::trace::fragment::Fragment;
+use crate::trace::header::Header;
+use crate::trace::seal::{CHECKSUMS, CHECKSUMS_KIND, Seal, SealingWriter};
+
+crate::options! {
+    /// How the columns of a trace are stored.
+    pub enum Compression {
+        None = "none": "as they are: read without a copy",
+        Lz4 = "lz4": "LZ4 frames: quick to write",
+        Zstd = "zstd": "Zstandard: smallest, reads faster than LZ4",
+    }
+}
+
+/// How a trace is stored; none of it changes the trace's content hash.
+#[derive(Clone, Copy, Debug)]
+pub struct WriteOptions {
+    /// How the columns are stored.
+    pub compression: Compression,
+    /// Fragments per batch, 1 to [`MAX_BATCH_ROWS`].
+    pub batch_rows: usize,
+}
+
+impl Default for WriteOptions {
+    fn default() -> Self {
+        WriteOptions { compression: Compression::None, batch_rows: 1 << 16 }
+    }
+}
+
+/// What a finished writer has written.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct Written {
+    /// How many fragments.
+    pub rows: u64,
+    /// The content hash, BLAKE3 in hexadecimal.
+    pub content: String,
+    /// How many bytes the file's sealed blocks take.
+    pub bytes: u64,
+}
+
+/// Writes a trace: fragments in, an Arrow IPC file out.
+///
+/// Memory is bounded by one batch. The file is a trace only after
+/// [`TraceWriter::finish`].
+pub struct TraceWriter<W: Write> {
+    header: Header,
+    schema: SchemaRef,
+    batch_rows: usize,
+    builder: BatchBuilder,
+    content: ContentHasher,
+    rows: u64,
+    file: FileWriter<SealingWriter<W>>,
+    place: String,
+}
+
+impl TraceWriter<OutputFile> {
+    /// Begins the trace that will stand at `path` once [`TraceWriter::finish`]
+    /// and [`OutputFile::commit`] have been called.
+    ///
+    /// # Errors
+    /// As [`OutputFile::create`] and [`TraceWriter::new`].
+    pub fn create(path: impl AsRef<Path>, header: Header, options: WriteOptions) -> Result<Self> {
+        let file = OutputFile::create(&path)?;
+        TraceWriter::new(file, &path.as_ref().display().to_string(), header, options)
+    }
+}
+
+impl<W: Write> TraceWriter<W> {
+    /// Begins a trace on `sink`; `place` names it in errors.
+    ///
+    /// # Errors
+    /// [`Error::Config`] for a header or options that break a rule,
+    /// [`Error::Io`] where the sink fails.
+    pub fn new(sink: W, place: &str, header: Header, options: WriteOptions) -> Result<Self> {
+        header.check()?;
+        if !(1..=MAX_BATCH_ROWS).contains(&options.batch_rows) {
+            return Err(Error::config(
+                format_args!("a batch of {} fragments cannot be", options.batch_rows),
+                format_args!("it holds 1 to {MAX_BATCH_ROWS}"),
+            ));
+        }
+        let mut schema = schema(&header);
+        let marked = std::sync::Arc::make_mut(&mut schema);
+        marked.metadata.insert(CHECKSUMS.to_string(), CHECKSUMS_KIND.to_string());
+        let compression = match options.compression {
+            Compression::None => None,
+            Compression::Lz4 => Some(CompressionType::LZ4_FRAME),
+            Compression::Zstd => Some(CompressionType::ZSTD),
+        };
+        let ipc = IpcWriteOptions::default()
+            .try_with_compression(compression)
+            .map_err(|e| arrow_error(place, e))?;
+        let file = FileWriter::try_new_with_options(SealingWriter::new(sink), &schema, ipc);
+        let mut file = file.map_err(|e| arrow_error(place, e))?;
+        file.get_mut().end_block(0);
+        Ok(TraceWriter {
+            builder: BatchBuilder::new(&header)?,
+            content: ContentHasher::new(&header),
+            header,
+            schema,
+            batch_rows: options.batch_rows,
+            rows: 0,
+            file,
+            place: place.to_string(),
+        })
+    }
+
+    /// The header it writes.
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// Adds one fragment.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for a fragment that no trace may hold (it is found when
+    /// its batch is full) or that breaks a declared constant; [`Error::Io`] where
+    /// the sink fails.
+    #[inline]
+    pub fn push(&mut self, fragment: &Fragment) -> Result<()> {
+        if let Err(column) = self.builder.push(fragment) {
+            return Err(Error::invalid(
+                format_args!("{}, row {}", self.place, self.rows + self.builder.len() as u64),
+                format_args!("'{}' is declared constant and is not", column.name()),
+                "declare only columns that are constant",
+            ));
+        }
+        if self.builder.len() == self.batch_rows {
+            self.flush_batch()?;
+        }
+        Ok(())
+    }
+
+    fn flush_batch(&mut self) -> Result<()> {
+        let batch = self.builder.take();
+        batch.check(&self.header, &format!("{}, after row {}", self.place, self.rows))?;
+        self.content.update(&batch);
+        let record_batch = batch.to_record_batch(&self.schema);
+        self.file.write(&record_batch).map_err(|e| arrow_error(&self.place, e))?;
+        self.file.get_mut().end_block(batch.len() as u64);
+        self.rows += batch.len() as u64;
+        Ok(())
+    }
+
+    /// Writes what is left and the footer; returns the sink and a summary.
+    ///
+    /// # Errors
+    /// As [`TraceWriter::push`].
+    pub fn finish(mut self) -> Result<(W, Written)> {
+        if self.builder.len() > 0 {
+            self.flush_batch()?;
+        }
+        let blocks = self.file.get_ref().blocks().to_vec();
+        let bytes = blocks.last().map_or(0, |b| b.end);
+        let content = self.content.finish(self.rows);
+        let seal = Seal { blocks, rows: self.rows, content: content.clone() };
+        for (key, value) in seal.to_metadata() {
+            self.file.write_metadata(key, value);
+        }
+        let sink = self.file.into_inner().map_err(|e| arrow_error(&self.place, e))?;
+        Ok((sink.into_inner(), Written { rows: self.rows, content, bytes }))
+    }
+}
+
+/// An error of the Arrow writer; in practice the sink's.
+fn arrow_error(place: &str, error: ArrowError) -> Error {
+    let source = match error {
+        ArrowError::IoError(_, source) => source,
+        other => std::io::Error::other(other),
+    };
+    Error::io("write", place, source)
+}
