@@ -124,6 +124,11 @@ impl<T> TileMap<T> {
         &mut self.tiles
     }
 
+    /// The touched tiles by value, in the order in which they were first touched.
+    pub fn into_touched(self) -> Vec<(TileId, T)> {
+        self.tiles
+    }
+
     /// The same tiles with other values.
     pub fn map<U>(self, change: impl FnOnce(Vec<(TileId, T)>) -> Vec<(TileId, U)>) -> TileMap<U> {
         TileMap { grid: self.grid, slots: self.slots, tiles: change(self.tiles) }

@@ -1,0 +1,198 @@
+//! The scene as a list of triangles, each made when it is asked for.
+
+use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4};
+
+use crate::capture::camera::Camera;
+use crate::scene::{Mesh, Particles, Scene, Shape, Strands};
+
+/// A vertex as the rasteriser and the shader need it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Vertex {
+    /// In the scene's space.
+    pub position: DVec3,
+    /// Not necessarily of unit length.
+    pub normal: Vec3,
+    pub uv: Vec2,
+    pub colour: Vec4,
+}
+
+/// One triangle of the scene.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Triangle {
+    pub vertices: [Vertex; 3],
+    pub material: usize,
+    pub object: u32,
+    pub primitive: u32,
+}
+
+/// The scene's triangles, numbered through in API order.
+pub(crate) struct Geometry<'a> {
+    scene: &'a Scene,
+    camera: &'a Camera,
+    /// The number of each object's first triangle, and at the end the total.
+    starts: Vec<u32>,
+    /// What turns each object's normals into the scene's space.
+    normal_matrices: Vec<DMat3>,
+}
+
+impl<'a> Geometry<'a> {
+    pub fn new(scene: &'a Scene, camera: &'a Camera) -> Self {
+        let mut starts = vec![0];
+        for object in &scene.objects {
+            // Scenes with more than 2^32 triangles are refused on loading.
+            let count = scene.shapes[object.shape].triangle_count() as u32;
+            starts.push(starts.last().expect("never empty") + count);
+        }
+        let normal_matrices = scene.objects.iter().map(|o| normal_matrix(&o.place)).collect();
+        Geometry { scene, camera, starts, normal_matrices }
+    }
+
+    /// How many triangles there are.
+    pub fn len(&self) -> u32 {
+        *self.starts.last().expect("never empty")
+    }
+
+    /// Triangle `primitive`.
+    pub fn triangle(&self, primitive: u32) -> Triangle {
+        let index = self.starts.partition_point(|start| *start <= primitive) - 1;
+        let object = &self.scene.objects[index];
+        let local = primitive - self.starts[index];
+        let shape = &self.scene.shapes[object.shape];
+        let vertices = match shape {
+            Shape::Mesh(mesh) => {
+                mesh_triangle(mesh, local, &object.place, &self.normal_matrices[index])
+            }
+            Shape::Strands(strands) => strand_triangle(strands, local, &object.place, self.camera),
+            Shape::Particles(particles) => {
+                particle_triangle(particles, local, &object.place, self.camera)
+            }
+        };
+        Triangle { vertices, material: shape.material(), object: index as u32, primitive }
+    }
+}
+
+/// Normals turn by the inverse transpose; the cofactor matrix is that times the
+/// determinant and exists for flat objects too.
+fn normal_matrix(place: &DAffine3) -> DMat3 {
+    let m = place.matrix3;
+    let sign = if m.determinant() < 0.0 { -1.0 } else { 1.0 };
+    DMat3::from_cols(
+        m.y_axis.cross(m.z_axis) * sign,
+        m.z_axis.cross(m.x_axis) * sign,
+        m.x_axis.cross(m.y_axis) * sign,
+    )
+}
+
+fn mesh_triangle(mesh: &Mesh, local: u32, place: &DAffine3, normals: &DMat3) -> [Vertex; 3] {
+    let corners = mesh.triangles[local as usize].map(|i| i as usize);
+    let positions = corners.map(|i| place.transform_point3(mesh.positions[i].as_dvec3()));
+    let flat = || (positions[1] - positions[0]).cross(positions[2] - positions[0]).as_vec3();
+    std::array::from_fn(|k| {
+        let i = corners[k];
+        Vertex {
+            position: positions[k],
+            normal: match mesh.normals.get(i) {
+                Some(n) => (*normals * n.as_dvec3()).as_vec3(),
+                None => flat(),
+            },
+            uv: mesh.uvs.get(i).copied().unwrap_or(Vec2::ZERO),
+            colour: mesh.colours.get(i).copied().unwrap_or(Vec4::ONE),
+        }
+    })
+}
+
+/// How far the normals at a ribbon's edges lean outwards: it is shaded as a thin
+/// cylinder would be.
+const RIBBON_ROUNDNESS: f64 = 0.9;
+
+fn strand_triangle(
+    strands: &Strands,
+    local: u32,
+    place: &DAffine3,
+    camera: &Camera,
+) -> [Vertex; 3] {
+    // Segment `s` of curve `c` has the number starts[c] − c + s.
+    let segment = local / 2;
+    let curve = partition(strands.strand_count(), |c| strands.starts[c] - c as u32 <= segment) - 1;
+    let (first, end) = (strands.starts[curve] as usize, strands.starts[curve + 1] as usize);
+    let point = segment as usize + curve;
+    let at = |i: usize| place.transform_point3(strands.points[i].as_dvec3());
+    let scale = place.matrix3.determinant().abs().cbrt();
+    let vertex = |i: usize, side: f64| {
+        // The curve's direction at a joint: from the point before to the point after.
+        let along = at((i + 1).min(end - 1)) - at(i.max(first + 1) - 1);
+        let towards = camera.towards(at(i));
+        let across = along.cross(towards).normalize_or(camera.right);
+        let width = f64::from(strands.radii[i]) * scale;
+        Vertex {
+            position: at(i) + across * (side * width),
+            normal: (towards + across * (side * RIBBON_ROUNDNESS)).as_vec3(),
+            uv: Vec2::new(side as f32 * 0.5 + 0.5, (i - first) as f32 / (end - 1 - first) as f32),
+            colour: strands.colours.get(curve).copied().unwrap_or(Vec4::ONE),
+        }
+    };
+    let (low, high) = (point, point + 1);
+    if local % 2 == 0 {
+        [vertex(low, -1.0), vertex(low, 1.0), vertex(high, 1.0)]
+    } else {
+        [vertex(low, -1.0), vertex(high, 1.0), vertex(high, -1.0)]
+    }
+}
+
+/// How many of 0..`count` come before the first that does not hold.
+fn partition(count: usize, holds: impl Fn(usize) -> bool) -> usize {
+    let (mut low, mut high) = (0, count);
+    while low < high {
+        let middle = low.midpoint(high);
+        if holds(middle) { low = middle + 1 } else { high = middle }
+    }
+    low
+}
+
+fn particle_triangle(
+    particles: &Particles,
+    local: u32,
+    place: &DAffine3,
+    camera: &Camera,
+) -> [Vertex; 3] {
+    let i = local as usize / 2;
+    let centre = place.transform_point3(particles.centres[i].as_dvec3());
+    let size = f64::from(particles.sizes[i]) * place.matrix3.determinant().abs().cbrt();
+    let (sin, cos) = libm::sincos(particles.angles.get(i).map_or(0.0, |a| f64::from(*a)));
+    let (x_axis, y_axis) =
+        (camera.right * cos + camera.up * sin, camera.up * cos - camera.right * sin);
+    let corner = |x: f64, y: f64| {
+        let outwards = x_axis * x + y_axis * y;
+        Vertex {
+            position: centre + outwards * size,
+            // Bulging towards the camera, as a puff of smoke would.
+            normal: (camera.back + outwards * 0.7).as_vec3(),
+            uv: Vec2::new(x as f32 * 0.5 + 0.5, 0.5 - y as f32 * 0.5),
+            colour: particles.colours.get(i).copied().unwrap_or(Vec4::ONE),
+        }
+    };
+    if local % 2 == 0 {
+        [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0)]
+    } else {
+        [corner(-1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn partition_finds_the_boundary() {
+        for boundary in 0..10 {
+            assert_eq!(partition(9, |i| i < boundary), boundary.min(9));
+        }
+    }
+
+    #[test]
+    fn a_mirrored_object_keeps_its_normals_outside() {
+        let place = DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0));
+        assert_eq!(normal_matrix(&place) * DVec3::X, -DVec3::X);
+        assert_eq!(normal_matrix(&place) * DVec3::Z, DVec3::Z);
+    }
+}

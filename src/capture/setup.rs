@@ -1,0 +1,135 @@
+//! From a triangle in space to triangles on the frame's sub-pixel grid.
+
+use glam::{DVec3, DVec4};
+
+use crate::capture::camera::Camera;
+use crate::capture::geometry::Triangle;
+
+/// Sub-pixel steps per pixel: 8 bits, as Direct3D asks.
+pub(crate) const STEPS: i64 = 256;
+/// A clipped corner is kept within this many pixels of the frame's centre, so
+/// that products of coordinates fit into 64 bits with room to spare.
+const GUARD_PIXELS: f64 = (1 << 20) as f64;
+
+/// A corner of a clipped triangle.
+#[derive(Clone, Copy, Debug)]
+struct Corner {
+    clip: DVec4,
+    /// Its weights in the triangle it was clipped from.
+    weights: DVec3,
+}
+
+/// A triangle on the sub-pixel grid, its corners in the order that makes its
+/// area positive with y downwards.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ScreenTriangle {
+    /// Corners in sub-pixel steps from the frame's top left.
+    pub corners: [[i64; 2]; 3],
+    /// Twice the area in steps²; positive.
+    pub area: i64,
+    /// Depth of each corner in units of the unorm32 range, 0 to 2^32 − 1.
+    pub depth: [f64; 3],
+    /// Reciprocal of each corner's clip-space w.
+    pub inverse_w: [f64; 3],
+    /// Each corner's weights in the original triangle.
+    pub weights: [DVec3; 3],
+}
+
+/// Clips `triangle` against the near plane and the guard band, projects it and
+/// snaps it to the sub-pixel grid; `keep_back` says whether a triangle that shows
+/// its back is drawn. Adds what is left to `out`.
+pub(crate) fn set_up(
+    triangle: &Triangle,
+    camera: &Camera,
+    keep_back: bool,
+    out: &mut Vec<ScreenTriangle>,
+) {
+    let mut polygon: Vec<Corner> = Vec::with_capacity(9);
+    for (i, vertex) in triangle.vertices.iter().enumerate() {
+        let clip = camera.to_clip * vertex.position.extend(1.0);
+        polygon.push(Corner { clip, weights: DVec3::from_array(unit(i)) });
+    }
+    // Near plane: clip z ≥ 0. The far plane holds the whole scene by construction.
+    clip(&mut polygon, |c| c.z);
+    let reach = [GUARD_PIXELS / (camera.size[0] * 0.5), GUARD_PIXELS / (camera.size[1] * 0.5)];
+    let inside =
+        |c: &Corner| c.clip.x.abs() <= reach[0] * c.clip.w && c.clip.y.abs() <= reach[1] * c.clip.w;
+    if !polygon.iter().all(inside) {
+        clip(&mut polygon, |c| reach[0] * c.w - c.x);
+        clip(&mut polygon, |c| reach[0] * c.w + c.x);
+        clip(&mut polygon, |c| reach[1] * c.w - c.y);
+        clip(&mut polygon, |c| reach[1] * c.w + c.y);
+    }
+    if polygon.len() < 3 {
+        return;
+    }
+    let snapped: Vec<[i64; 2]> = polygon.iter().map(|c| snap(c.clip, camera.size)).collect();
+    for i in 1..polygon.len() - 1 {
+        let mut order = [0, i, i + 1];
+        let [a, b, c] = order.map(|k| snapped[k]);
+        let mut area = cross(a, b, c);
+        if area == 0 {
+            continue;
+        }
+        // Counter-clockwise with y upwards is the front: that is a negative area
+        // with y downwards.
+        if area > 0 && !keep_back {
+            continue;
+        }
+        if area < 0 {
+            order.swap(1, 2);
+            area = -area;
+        }
+        let pick = order.map(|k| polygon[k]);
+        out.push(ScreenTriangle {
+            corners: order.map(|k| snapped[k]),
+            area,
+            depth: pick.map(|c| (c.clip.z / c.clip.w).clamp(0.0, 1.0) * f64::from(u32::MAX)),
+            inverse_w: pick.map(|c| 1.0 / c.clip.w),
+            weights: pick.map(|c| c.weights),
+        });
+    }
+}
+
+fn unit(i: usize) -> [f64; 3] {
+    std::array::from_fn(|k| if k == i { 1.0 } else { 0.0 })
+}
+
+/// Twice the signed area of a triangle.
+pub(crate) fn cross(a: [i64; 2], b: [i64; 2], c: [i64; 2]) -> i64 {
+    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+}
+
+/// Cuts off the part of a convex polygon where `distance` is negative.
+///
+/// A crossing is always computed from its inner end to its outer one, so that two
+/// triangles that share an edge share its crossing to the last bit.
+fn clip(polygon: &mut Vec<Corner>, distance: impl Fn(DVec4) -> f64) {
+    if polygon.iter().all(|c| distance(c.clip) >= 0.0) {
+        return;
+    }
+    let mut kept = Vec::with_capacity(polygon.len() + 1);
+    for (i, a) in polygon.iter().enumerate() {
+        let b = &polygon[(i + 1) % polygon.len()];
+        let (da, db) = (distance(a.clip), distance(b.clip));
+        if da >= 0.0 {
+            kept.push(*a);
+        }
+        if (da >= 0.0) != (db >= 0.0) {
+            let (inner, outer, d) = if da >= 0.0 { (a, b, (da, db)) } else { (b, a, (db, da)) };
+            let t = d.0 / (d.0 - d.1);
+            kept.push(Corner {
+                clip: inner.clip + (outer.clip - inner.clip) * t,
+                weights: inner.weights + (outer.weights - inner.weights) * t,
+            });
+        }
+    }
+    *polygon = kept;
+}
+
+/// The nearest sub-pixel step of a projected corner.
+fn snap(clip: DVec4, size: [f64; 2]) -> [i64; 2] {
+    let round =
+        |ndc: f64, pixels: f64| ((ndc * 0.5 + 0.5) * pixels * STEPS as f64 + 0.5).floor() as i64;
+    [round(clip.x / clip.w, size[0]), round(-clip.y / clip.w, size[1])]
+}

@@ -1,0 +1,151 @@
+//! Colour and alpha of a fragment.
+
+use glam::{DVec3, Vec2, Vec3, Vec4};
+
+use crate::capture::camera::Camera;
+use crate::capture::geometry::Triangle;
+use crate::capture::raster::Weights;
+use crate::scene::{AlphaMode, Material, Scene, TextureUse};
+
+/// Light: a directional one that moves with the camera, a weaker one from the
+/// other side, and a little from everywhere.
+const KEY: Vec3 = Vec3::new(0.45, 0.65, 0.61);
+const KEY_STRENGTH: f32 = 0.75;
+const FILL: Vec3 = Vec3::new(-0.75, 0.10, 0.65);
+const FILL_STRENGTH: f32 = 0.15;
+const AMBIENT: f32 = 0.10;
+
+/// Shades fragments of a scene.
+pub(crate) struct Shader<'a> {
+    scene: &'a Scene,
+    camera: &'a Camera,
+    /// Unit vectors towards the lights, in the scene's space.
+    key: Vec3,
+    fill: Vec3,
+    alpha: Option<f32>,
+}
+
+impl<'a> Shader<'a> {
+    /// `alpha`, where given, replaces the materials' own; texture alphas still
+    /// multiply it.
+    pub fn new(scene: &'a Scene, camera: &'a Camera, alpha: Option<f32>) -> Self {
+        let turn = |light: Vec3| {
+            let l = light.as_dvec3();
+            let turned = camera.right * l.x + camera.up * l.y + camera.back * l.z;
+            turned.normalize_or(DVec3::Z).as_vec3()
+        };
+        Shader { scene, camera, key: turn(KEY), fill: turn(FILL), alpha }
+    }
+
+    /// Whether the back of a surface of `material` is drawn.
+    pub fn material(&self, index: usize) -> &Material {
+        &self.scene.materials[index]
+    }
+
+    /// The one alpha that every fragment of the scene has, if there is one.
+    pub fn constant_alpha(&self) -> Option<f32> {
+        let mut common = None;
+        for shape in &self.scene.shapes {
+            let material = self.material(shape.material());
+            let vertex_alpha = match shape {
+                crate::scene::Shape::Mesh(m) => &m.colours,
+                crate::scene::Shape::Strands(s) => &s.colours,
+                crate::scene::Shape::Particles(p) => &p.colours,
+            };
+            let uniform = vertex_alpha.iter().all(|c| c.w == 1.0);
+            let textured = material.alpha_texture.is_some()
+                || material
+                    .base_texture
+                    .is_some_and(|t| self.scene.textures[t.texture].has_alpha());
+            let alpha = match (self.alpha, material.alpha_mode) {
+                (None, AlphaMode::Opaque) if material.transmission == 0.0 => 1.0,
+                (None, AlphaMode::Mask { .. }) if material.transmission == 0.0 => 1.0,
+                (Some(alpha), AlphaMode::Opaque | AlphaMode::Mask { .. }) => alpha,
+                (Some(alpha), AlphaMode::Blend) if uniform && !textured => alpha,
+                (None, AlphaMode::Blend)
+                    if uniform && !textured && material.transmission == 0.0 =>
+                {
+                    material.base.w.clamp(0.0, 1.0)
+                }
+                _ => return None,
+            };
+            if *common.get_or_insert(alpha) != alpha {
+                return None;
+            }
+        }
+        common
+    }
+
+    /// Linear colour and alpha of a fragment of `triangle` where its vertices
+    /// have these weights; `None` where there is nothing: an alpha of 0, or cut
+    /// out by a mask.
+    pub fn shade(&self, triangle: &Triangle, weights: &Weights) -> Option<([f32; 3], f32)> {
+        let material = self.material(triangle.material);
+        let [a, b, c] = &triangle.vertices;
+        let mix = |w: &[f64; 3], a: Vec4, b: Vec4, c: Vec4| {
+            a * w[0] as f32 + b * w[1] as f32 + c * w[2] as f32
+        };
+        let mut base = material.base * mix(&weights.at, a.colour, b.colour, c.colour);
+        let uv = |w: &[f64; 3]| a.uv * w[0] as f32 + b.uv * w[1] as f32 + c.uv * w[2] as f32;
+        let texel = |t: TextureUse| {
+            let turn = |v: Vec2| t.transform.matrix2 * v;
+            let at = t.transform.transform_point2(uv(&weights.at));
+            let (dx, dy) = (turn(uv(&weights.dx)), turn(uv(&weights.dy)));
+            self.scene.textures[t.texture].sample(at, dx, dy)
+        };
+        let base_texel = material.base_texture.map_or(Vec4::ONE, texel);
+        // What the texture and the vertices say; the material's own factor is what
+        // `--alpha` replaces.
+        let detail_alpha = base_texel.w
+            * material.alpha_texture.map_or(1.0, |t| texel(t).x)
+            * if material.base.w > 0.0 { base.w / material.base.w } else { 1.0 };
+        base *= base_texel;
+
+        let own = self.alpha.unwrap_or(material.base.w);
+        let mut alpha = match material.alpha_mode {
+            AlphaMode::Opaque => self.alpha.unwrap_or(1.0),
+            AlphaMode::Mask { cutoff } => {
+                if material.base.w * detail_alpha < cutoff {
+                    return None;
+                }
+                self.alpha.unwrap_or(1.0)
+            }
+            AlphaMode::Blend => own * detail_alpha,
+        };
+        if self.alpha.is_none() && material.transmission > 0.0 {
+            let tint = (base.x + base.y + base.z) / 3.0;
+            alpha *= 1.0 - material.transmission.clamp(0.0, 1.0) * tint.clamp(0.0, 1.0);
+        }
+        let alpha = alpha.clamp(0.0, 1.0);
+        if alpha.is_nan() || alpha == 0.0 {
+            return None;
+        }
+
+        let mut colour = base.truncate();
+        if !material.unlit {
+            colour *= self.light(triangle, weights);
+        }
+        let glow = material.emissive_texture.map_or(Vec3::ONE, |t| texel(t).truncate());
+        colour += material.emissive * glow;
+        // Negative light is no colour; beyond half precision there is no need to go.
+        let colour = colour.clamp(Vec3::ZERO, Vec3::splat(65504.0));
+        Some((colour.to_array(), alpha))
+    }
+
+    /// The light that a diffuse surface reflects towards the camera, per unit of
+    /// its colour: the side that faces the camera is lit.
+    fn light(&self, triangle: &Triangle, weights: &Weights) -> f32 {
+        let [a, b, c] = &triangle.vertices;
+        let w = weights.at;
+        let normal = a.normal * w[0] as f32 + b.normal * w[1] as f32 + c.normal * w[2] as f32;
+        let point = a.position * w[0] + b.position * w[1] + c.position * w[2];
+        let towards = self.camera.towards(point).as_vec3();
+        let mut normal = normal.normalize_or(towards);
+        if normal.dot(towards) < 0.0 {
+            normal = -normal;
+        }
+        AMBIENT
+            + KEY_STRENGTH * normal.dot(self.key).max(0.0)
+            + FILL_STRENGTH * normal.dot(self.fill).max(0.0)
+    }
+}

@@ -1,0 +1,207 @@
+//! Errors over several seeds, variance and bias apart.
+
+use serde::Serialize;
+
+use crate::metrics::{Errors, Estimate, Region, UNIT, errors};
+use crate::picture::{Picture, TilePixels};
+use crate::tile::{TILE_PIXELS, TileMap};
+
+/// Gathers the pictures of independent seeds against one reference.
+#[derive(Debug)]
+pub struct Ensemble<'a> {
+    reference: &'a Picture,
+    region: &'a Region,
+    runs: Vec<Errors>,
+    /// Sums over the runs of the error and of its square, at each pixel.
+    sums: TileMap<(TilePixels, TilePixels)>,
+    /// The same of the untouched pixels' common error.
+    rest: ([f64; 3], [f64; 3]),
+}
+
+/// The errors of a design over several seeds, in 8-bit units.
+#[derive(Clone, PartialEq, Debug, Serialize)]
+pub struct EnsembleErrors {
+    /// How many seeds.
+    pub seeds: usize,
+    /// How many pixels.
+    pub pixels: u64,
+    /// Root of the mean square error on linear values.
+    pub rmse: Estimate,
+    /// Root of the mean square error on sRGB-encoded values.
+    pub rmse_srgb: Estimate,
+    /// Mean of picture minus reference, on linear values.
+    pub mean: Estimate,
+    /// Largest absolute difference of any run, on linear values.
+    pub max: f64,
+    /// Mean over pixels and channels of the variance over seeds; in squared
+    /// units. `None` for a single seed.
+    pub variance: Option<f64>,
+    /// Mean over pixels and channels of the squared bias, estimated without bias
+    /// of its own: scatters around 0 for an unbiased design, so it can be
+    /// negative. In squared units; `None` for a single seed.
+    pub bias_squared: Option<f64>,
+}
+
+impl<'a> Ensemble<'a> {
+    /// An ensemble without runs.
+    pub fn new(reference: &'a Picture, region: &'a Region) -> Self {
+        Ensemble {
+            reference,
+            region,
+            runs: Vec::new(),
+            sums: TileMap::new(reference.grid()),
+            rest: ([0.0; 3], [0.0; 3]),
+        }
+    }
+
+    /// Adds the picture of one seed.
+    ///
+    /// # Panics
+    /// Where its frame differs from the reference's.
+    pub fn add(&mut self, picture: &Picture) {
+        self.runs.push(errors(picture, self.reference, self.region));
+        let add = |sum: &mut [f64; 3], square: &mut [f64; 3], a: [f64; 3], b: [f64; 3]| {
+            for i in 0..3 {
+                let difference = a[i] - b[i];
+                sum[i] += difference;
+                square[i] += difference * difference;
+            }
+        };
+        // A tile that earlier runs did not touch had their common error so far.
+        let rest = self.rest;
+        let mut tiles = picture.tiles_with(self.reference);
+        tiles.extend(self.sums.touched().iter().map(|(tile, _)| *tile));
+        tiles.sort_unstable();
+        tiles.dedup();
+        for tile in tiles {
+            let (sum, square) = self.sums.get_or_insert_with(tile, || {
+                (Box::new([rest.0; TILE_PIXELS]), Box::new([rest.1; TILE_PIXELS]))
+            });
+            let (a, b) = (picture.tile(tile), self.reference.tile(tile));
+            for within in 0..TILE_PIXELS {
+                add(
+                    &mut sum[within],
+                    &mut square[within],
+                    a.map_or(picture.background(), |t| t[within]),
+                    b.map_or(self.reference.background(), |t| t[within]),
+                );
+            }
+        }
+        add(&mut self.rest.0, &mut self.rest.1, picture.background(), self.reference.background());
+    }
+
+    /// The error of each run.
+    pub fn runs(&self) -> &[Errors] {
+        &self.runs
+    }
+
+    /// The mean over the runs at each pixel, minus the reference, over the
+    /// standard error of that mean: the bias in units of what chance explains.
+    /// 0 where all runs agree with the reference, infinite where they agree with
+    /// each other and not with it.
+    pub fn z_scores(&self) -> Vec<f64> {
+        let n = self.runs.len() as f64;
+        let mut scores = Vec::new();
+        for (tile, (sum, square)) in self.sums.touched() {
+            for within in (0..TILE_PIXELS).filter(|w| self.region.holds(*tile, *w)) {
+                for (s, q) in sum[within].iter().zip(&square[within]) {
+                    let mean = s / n;
+                    let variance = ((q - s * mean) / (n - 1.0)).max(0.0);
+                    // Rounding leaves crumbs where all runs are equal.
+                    let (mean, deviation) = if mean.abs() < 1e-6 && variance < 1e-12 {
+                        (0.0, 1.0)
+                    } else {
+                        (mean, (variance / n).sqrt())
+                    };
+                    scores.push(mean / deviation);
+                }
+            }
+        }
+        scores
+    }
+
+    /// The errors over the runs so far.
+    pub fn finish(&self) -> EnsembleErrors {
+        let n = self.runs.len();
+        let squares = |f: fn(&Errors) -> f64| {
+            let runs: Vec<f64> = self.runs.iter().map(|r| f(r) * f(r)).collect();
+            Estimate::of(&runs).sqrt()
+        };
+        let means: Vec<f64> = self.runs.iter().map(|r| r.mean).collect();
+        let (mut variance, mut bias_squared) = (0.0, 0.0);
+        if n > 1 {
+            let n = n as f64;
+            for (tile, (sum, square)) in self.sums.touched() {
+                for within in (0..TILE_PIXELS).filter(|w| self.region.holds(*tile, *w)) {
+                    for (s, q) in sum[within].iter().zip(&square[within]) {
+                        let mean = s / n;
+                        let v = ((q - s * mean) / (n - 1.0)).max(0.0);
+                        variance += v;
+                        // E[mean²] = bias² + v/n.
+                        bias_squared += mean * mean - v / n;
+                    }
+                }
+            }
+        }
+        let scale = 1.0 / ((3 * self.region.pixels()).max(1) as f64 * UNIT * UNIT);
+        EnsembleErrors {
+            seeds: n,
+            pixels: self.region.pixels(),
+            rmse: squares(|r| r.rmse),
+            rmse_srgb: squares(|r| r.rmse_srgb),
+            mean: Estimate::of(&means),
+            max: self.runs.iter().map(|r| r.max).fold(0.0, f64::max),
+            variance: (n > 1).then_some(variance * scale),
+            bias_squared: (n > 1).then_some(bias_squared * scale),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::hash;
+    use crate::tile::TileGrid;
+
+    #[test]
+    fn variance_and_bias_come_apart() {
+        let grid = TileGrid::new(48, 48);
+        let reference = Picture::from_fn(grid, |_, _| [0.5; 3]);
+        let region = Region::frame(grid);
+        let mut ensemble = Ensemble::new(&reference, &region);
+        let unit = |words| f64::from(hash::<4>(words)) / 2_f64.powi(32);
+        // Uniform noise of variance 0.2²/12 with a bias of 0.03.
+        for seed in 0..40 {
+            ensemble.add(&Picture::from_fn(grid, |x, y| {
+                std::array::from_fn(|c| 0.53 + 0.2 * (unit([seed, x, y, c as u32]) - 0.5))
+            }));
+        }
+        let e = ensemble.finish();
+        let unit = 255.0 * 255.0;
+        let (variance, bias) = (e.variance.unwrap() / unit, e.bias_squared.unwrap() / unit);
+        assert!((variance - 0.04 / 12.0).abs() < 1e-4, "{variance}");
+        assert!((bias - 0.03 * 0.03).abs() < 1e-5, "{bias}");
+        assert!((e.mean.value / 255.0 - 0.03).abs() < 1e-3);
+        assert!(e.mean.low > 0.0);
+        let rmse = (variance + bias).sqrt() * 255.0;
+        assert!((e.rmse.value / rmse - 1.0).abs() < 1e-2 && e.rmse.low < e.rmse.value);
+    }
+
+    #[test]
+    fn a_bias_stands_out_in_the_z_scores() {
+        let grid = TileGrid::new(16, 16);
+        let reference = Picture::from_fn(grid, |_, _| [0.0; 3]);
+        let region = Region::frame(grid);
+        let mut ensemble = Ensemble::new(&reference, &region);
+        for seed in 0..100_u32 {
+            // ±1 in turn, but for one pixel that is always 1.
+            let sign = if seed % 2 == 0 { 1.0 } else { -1.0 };
+            ensemble.add(&Picture::from_fn(grid, |x, y| {
+                if (x, y) == (5, 5) { [1.0; 3] } else { [sign; 3] }
+            }));
+        }
+        let scores = ensemble.z_scores();
+        assert_eq!(scores.iter().filter(|z| z.is_infinite()).count(), 3);
+        assert_eq!(scores.iter().filter(|z| **z == 0.0).count(), 3 * 255);
+    }
+}

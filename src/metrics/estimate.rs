@@ -1,0 +1,89 @@
+//! Means with their uncertainty.
+
+use serde::Serialize;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+/// A mean over independent runs and how well it is known.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+pub struct Estimate {
+    /// The mean.
+    pub value: f64,
+    /// Lower end of its 95 % confidence interval; the mean itself where there is
+    /// only one run.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+/// Student's t for a two-sided 95 % interval with `freedom` degrees of freedom.
+fn student95(freedom: f64) -> f64 {
+    StudentsT::new(0.0, 1.0, freedom).map_or(f64::INFINITY, |t| t.inverse_cdf(0.975))
+}
+
+impl Estimate {
+    /// The mean of `runs` with Student's interval.
+    pub fn of(runs: &[f64]) -> Self {
+        let n = runs.len() as f64;
+        let mean = runs.iter().sum::<f64>() / n.max(1.0);
+        if runs.len() < 2 {
+            return Estimate { value: mean, low: mean, high: mean };
+        }
+        let square = runs.iter().map(|r| (r - mean) * (r - mean)).sum::<f64>();
+        let half = student95(n - 1.0) * (square / (n - 1.0) / n).sqrt();
+        Estimate { value: mean, low: mean - half, high: mean + half }
+    }
+
+    /// The root of a mean that cannot be negative, such as an RMSE from an MSE.
+    pub fn sqrt(self) -> Self {
+        let root = |v: f64| v.max(0.0).sqrt();
+        Estimate { value: root(self.value), low: root(self.low), high: root(self.high) }
+    }
+
+    /// The same in other units.
+    pub fn scaled(self, by: f64) -> Self {
+        Estimate { value: self.value * by, low: self.low * by, high: self.high * by }
+    }
+
+    /// The ratio of two independent estimates of positive quantities: their
+    /// intervals' relative half-widths, on a logarithmic scale, add in quadrature.
+    pub fn ratio(self, other: Estimate) -> Self {
+        let value = self.value / other.value;
+        let half = |e: Estimate| (e.high / e.low).ln() / 2.0;
+        let half = half(self).hypot(half(other));
+        if half.is_finite() {
+            Estimate { value, low: value * (-half).exp(), high: value * half.exp() }
+        } else {
+            Estimate { value, low: 0.0, high: f64::INFINITY }
+        }
+    }
+
+    /// Half of the interval's width.
+    pub fn half_width(&self) -> f64 {
+        (self.high - self.low) / 2.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn student_intervals() {
+        // n = 5, mean 3, s = √2.5: half-width t(4) · s/√5 = 2.776445 · 0.707107.
+        let e = Estimate::of(&[1.0, 2.0, 3.0, 4.0, 5.0]);
+        assert_eq!(e.value, 3.0);
+        assert!((e.half_width() - 2.776_445 * 0.5_f64.sqrt()).abs() < 1e-5, "{e:?}");
+        assert_eq!(Estimate::of(&[7.0]), Estimate { value: 7.0, low: 7.0, high: 7.0 });
+    }
+
+    #[test]
+    fn ratios_carry_both_sides() {
+        let a = Estimate { value: 2.0, low: 1.9, high: 2.1 };
+        let exact = Estimate { value: 4.0, low: 4.0, high: 4.0 };
+        let r = a.ratio(exact);
+        assert_eq!(r.value, 0.5);
+        assert!((r.low - 0.4756).abs() < 1e-3 && (r.high - 0.5257).abs() < 1e-3, "{r:?}");
+        let wider = a.ratio(Estimate { value: 4.0, low: 3.8, high: 4.2 });
+        assert!(wider.half_width() > r.half_width());
+    }
+}

@@ -1,0 +1,277 @@
+//! Pictures as files: EXR (linear, layers) and PNG (sRGB, 8 bits).
+
+use std::io::{Seek, SeekFrom, Write};
+use std::path::Path;
+
+use exr::prelude::{
+    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, ImageAttributes, LayerAttributes,
+    ReadChannels, ReadLayers, Text, Vec2, WritableImage,
+};
+use image::ImageEncoder;
+
+use crate::error::{Error, Result};
+use crate::output::OutputFile;
+use crate::picture::{Picture, srgb};
+use crate::tile::TileGrid;
+
+/// The most pixels of a picture that is written or read.
+const MAX_PIXELS: u64 = 1 << 28;
+
+/// A named picture within an EXR file.
+#[derive(Clone, Copy, Debug)]
+pub struct Layer<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// What it shows.
+    pub picture: &'a Picture,
+}
+
+fn check_size(path: &Path, width: u32, height: u32) -> Result<()> {
+    if u64::from(width) * u64::from(height) <= MAX_PIXELS {
+        return Ok(());
+    }
+    Err(Error::unsupported(
+        path.display(),
+        format_args!("a picture of {width}x{height} pixels is too large"),
+        format_args!("pictures have at most {MAX_PIXELS} pixels"),
+    ))
+}
+
+/// Writes `layers`, pictures of one size, as an EXR file in single precision.
+///
+/// # Errors
+/// [`Error::Io`] where it cannot be written, [`Error::Unsupported`] where it
+/// would have more than 2^28 pixels.
+///
+/// # Panics
+/// Where there are no layers or their sizes differ.
+pub fn write_exr(path: impl AsRef<Path>, layers: &[Layer<'_>]) -> Result<()> {
+    let path = path.as_ref();
+    let (width, height) = (layers[0].picture.width(), layers[0].picture.height());
+    check_size(path, width, height)?;
+    let size = Vec2(width as usize, height as usize);
+    let layer_data: exr::prelude::Layers<_> = layers
+        .iter()
+        .map(|layer| {
+            assert_eq!(layer.picture.grid(), TileGrid::new(width, height));
+            let channel = |name: &str, index: usize| {
+                let mut samples = Vec::with_capacity(size.area());
+                for y in 0..height {
+                    samples.extend((0..width).map(|x| layer.picture.get(x, y)[index] as f32));
+                }
+                AnyChannel::new(name, FlatSamples::F32(samples))
+            };
+            let channels = [channel("R", 0), channel("G", 1), channel("B", 2)];
+            exr::prelude::Layer::new(
+                size,
+                LayerAttributes::named(layer.name),
+                Encoding::SMALL_LOSSLESS,
+                AnyChannels::sort(channels.into_iter().collect()),
+            )
+        })
+        .collect();
+    let mut attributes = ImageAttributes::new(exr::prelude::IntegerBounds::from_dimensions(size));
+    let writer = format!("screendoor {}", env!("CARGO_PKG_VERSION"));
+    attributes
+        .other
+        .insert(Text::from("writer"), exr::prelude::AttributeValue::Text(writer.as_str().into()));
+    let image = Image { attributes, layer_data };
+    // The encoder seeks, which a file under construction does not: it is encoded
+    // in memory.
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let encoded = image.write().non_parallel().to_buffered(&mut bytes);
+    encoded.map_err(|e| exr_error(path, "write", e))?;
+    bytes.seek(SeekFrom::Start(0)).map_err(|e| Error::io("write", path, e))?;
+    OutputFile::put(path, bytes.get_ref())
+}
+
+/// Writes a picture as an 8-bit sRGB PNG.
+///
+/// # Errors
+/// As [`write_exr`].
+pub fn write_png(path: impl AsRef<Path>, picture: &Picture) -> Result<()> {
+    let path = path.as_ref();
+    check_size(path, picture.width(), picture.height())?;
+    let mut bytes = Vec::with_capacity(picture.width() as usize * picture.height() as usize * 3);
+    for y in 0..picture.height() {
+        for x in 0..picture.width() {
+            bytes.extend(picture.get(x, y).map(srgb::encode8));
+        }
+    }
+    let mut file = OutputFile::create(path)?;
+    let (width, height) = (picture.width(), picture.height());
+    let encoded = image::codecs::png::PngEncoder::new(&mut file)
+        .write_image(&bytes, width, height, image::ExtendedColorType::Rgb8)
+        .map_err(|e| match e {
+            image::ImageError::IoError(e) => e,
+            other => std::io::Error::other(other),
+        })
+        .and_then(|()| file.flush());
+    encoded.map_err(|e| Error::io("write", path, e))?;
+    file.commit()
+}
+
+/// Reads the picture in an EXR file (its layer `layer`, or the first) or in a
+/// PNG (as sRGB).
+///
+/// # Errors
+/// [`Error::Io`] where it cannot be read, [`Error::Invalid`] where it is no
+/// such picture, [`Error::Config`] for a layer or format that is not there.
+pub fn read(path: impl AsRef<Path>, layer: Option<&str>) -> Result<Picture> {
+    let path = path.as_ref();
+    let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+    let bytes = std::fs::read(path).map_err(|e| Error::io("read", path, e))?;
+    match ending.as_str() {
+        "exr" => read_exr(path, &bytes, layer),
+        "png" if layer.is_some() => {
+            Err(Error::config("a PNG has no layers", "leave --layer out, or give an EXR file"))
+        }
+        "png" => read_png(path, &bytes),
+        _ => Err(Error::config(
+            format_args!("'{}' is no picture that can be read", path.display()),
+            "give a .exr or .png file",
+        )),
+    }
+}
+
+fn read_png(path: &Path, bytes: &[u8]) -> Result<Picture> {
+    let bad = |e: &dyn std::fmt::Display| {
+        Error::invalid(path.display(), format_args!("it cannot be read as PNG ({e})"), "replace it")
+    };
+    let mut reader = image::ImageReader::new(std::io::Cursor::new(bytes));
+    reader.set_format(image::ImageFormat::Png);
+    let mut limits = image::Limits::no_limits();
+    limits.max_alloc = Some(MAX_PIXELS * 8);
+    reader.limits(limits);
+    let image = reader.decode().map_err(|e| bad(&e))?.into_rgb8();
+    let (width, height) = image.dimensions();
+    check_frame(path, width as usize, height as usize)?;
+    Ok(Picture::from_fn(TileGrid::new(width, height), |x, y| {
+        image.get_pixel(x, y).0.map(|v| srgb::decode(f64::from(v) / 255.0))
+    }))
+}
+
+fn check_frame(path: &Path, width: usize, height: usize) -> Result<()> {
+    if (1..=1 << 16).contains(&width) && (1..=1 << 16).contains(&height) {
+        return check_size(path, width as u32, height as u32);
+    }
+    let what = format_args!("a picture of {width}x{height} pixels").to_string();
+    Err(Error::unsupported(path.display(), what, "each side is 1 to 65536 pixels"))
+}
+
+fn read_exr(path: &Path, bytes: &[u8], layer: Option<&str>) -> Result<Picture> {
+    let bad = |what: &str| {
+        Error::invalid(path.display(), what, "give an EXR file with the channels R, G and B")
+    };
+    // The pixel count first, from the headers alone: nothing is allocated for a
+    // size that a file merely claims.
+    let meta = exr::meta::MetaData::read_from_buffered(std::io::Cursor::new(bytes), true)
+        .map_err(|e| exr_error(path, "read", e))?;
+    for header in &meta.headers {
+        check_frame(path, header.layer_size.0, header.layer_size.1)?;
+    }
+    let image = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .all_layers()
+        .all_attributes()
+        .non_parallel()
+        .from_buffered(std::io::Cursor::new(bytes))
+        .map_err(|e| exr_error(path, "read", e))?;
+    let name = |l: &exr::prelude::Layer<AnyChannels<FlatSamples>>| {
+        l.attributes.layer_name.as_ref().map_or_else(String::new, Text::to_string)
+    };
+    let found = match layer {
+        None => image.layer_data.first().ok_or_else(|| bad("it has no layers"))?,
+        Some(wanted) => {
+            let hit = image.layer_data.iter().find(|l| name(l) == wanted);
+            hit.ok_or_else(|| {
+                let names: Vec<String> = image.layer_data.iter().map(name).collect();
+                Error::unknown(
+                    &format!("layer of {}:", path.display()),
+                    wanted,
+                    names.iter().map(String::as_str),
+                )
+            })?
+        }
+    };
+    let channel = |wanted: &str| {
+        let hit = found.channel_data.list.iter().find(|c| c.name.eq(wanted));
+        hit.map(|c| &c.sample_data).ok_or_else(|| bad(&format!("it has no channel '{wanted}'")))
+    };
+    let channels = [channel("R")?, channel("G")?, channel("B")?];
+    let (width, height) = (found.size.0, found.size.1);
+    Ok(Picture::from_fn(TileGrid::new(width as u32, height as u32), |x, y| {
+        let index = y as usize * width + x as usize;
+        channels.map(|c| f64::from(c.value_by_flat_index(index).to_f32()))
+    }))
+}
+
+fn exr_error(path: &Path, action: &'static str, error: exr::error::Error) -> Error {
+    match error {
+        exr::error::Error::Io(source) => Error::io(action, path, source),
+        other => Error::invalid(
+            path.display(),
+            format_args!("it cannot be read as EXR ({other})"),
+            "give a whole EXR file",
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn picture(scale: f64) -> Picture {
+        Picture::from_fn(TileGrid::new(21, 18), |x, y| {
+            [f64::from(x) * scale, f64::from(y) * scale, -1.5]
+        })
+    }
+
+    #[test]
+    fn exr_layers_round_trip() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        let (colour, error) = (picture(0.25), picture(-2.0));
+        let layers =
+            [Layer { name: "colour", picture: &colour }, Layer { name: "error", picture: &error }];
+        write_exr(&path, &layers).unwrap();
+        assert_eq!(read(&path, None).unwrap().hash(), colour.hash());
+        assert_eq!(read(&path, Some("colour")).unwrap().hash(), colour.hash());
+        assert_eq!(read(&path, Some("error")).unwrap().hash(), error.hash());
+        let message = read(&path, Some("eror")).unwrap_err().to_string();
+        assert!(message.contains("did you mean 'error'?"), "{message}");
+    }
+
+    #[test]
+    fn png_holds_srgb() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        let ramp =
+            Picture::from_fn(TileGrid::new(256, 1), |x, _| [srgb::decode(f64::from(x) / 255.0); 3]);
+        write_png(&path, &ramp).unwrap();
+        assert_eq!(read(&path, None).unwrap().hash(), ramp.hash());
+    }
+
+    #[test]
+    fn truncated_pictures_are_errors() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["a.exr", "a.png"] {
+            let path = folder.path().join(name);
+            match name {
+                "a.exr" => {
+                    let picture = picture(0.1);
+                    write_exr(&path, &[Layer { name: "colour", picture: &picture }]).unwrap();
+                }
+                _ => write_png(&path, &picture(0.01)).unwrap(),
+            }
+            let whole = std::fs::read(&path).unwrap();
+            for length in [0, 3, whole.len() / 3, whole.len() - 1] {
+                std::fs::write(&path, &whole[..length]).unwrap();
+                let result = read(&path, None);
+                assert!(result.is_err() || (name == "a.png" && length + 1 == whole.len()));
+            }
+        }
+    }
+}

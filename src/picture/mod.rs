@@ -1,0 +1,150 @@
+//! Pictures: linear colours of a frame's pixels, held tile by tile.
+
+mod file;
+pub mod srgb;
+
+pub use file::{Layer, read, write_exr, write_png};
+
+use crate::tile::{TILE_PIXELS, TileGrid, TileId, TileMap};
+
+/// The pixels of one tile.
+pub type TilePixels = Box<[[f64; 3]; TILE_PIXELS]>;
+
+/// A picture of linear RGB colours. Tiles that nothing touched show the
+/// background and take no memory.
+#[derive(Clone, Debug)]
+pub struct Picture {
+    background: [f64; 3],
+    tiles: TileMap<TilePixels>,
+}
+
+impl Picture {
+    /// A picture that shows `background` everywhere.
+    pub fn new(grid: TileGrid, background: [f64; 3]) -> Self {
+        Picture { background, tiles: TileMap::new(grid) }
+    }
+
+    /// A picture made of finished tiles.
+    pub(crate) fn from_tiles(background: [f64; 3], tiles: TileMap<TilePixels>) -> Self {
+        Picture { background, tiles }
+    }
+
+    /// A picture whose pixel (x, y) has the colour that `pixel` gives.
+    pub fn from_fn(grid: TileGrid, mut pixel: impl FnMut(u32, u32) -> [f64; 3]) -> Self {
+        let mut picture = Picture::new(grid, [0.0; 3]);
+        for id in (0..grid.count() as u32).map(TileId) {
+            let tile = picture.tile_mut(id);
+            for (within, colour) in tile.iter_mut().enumerate() {
+                let (x, y) = grid.pixel(id, within);
+                if grid.contains((x, y)) {
+                    *colour = pixel(x, y);
+                }
+            }
+        }
+        picture
+    }
+
+    /// The tiles of its frame.
+    pub fn grid(&self) -> TileGrid {
+        self.tiles.grid()
+    }
+
+    /// Frame width in pixels.
+    pub fn width(&self) -> u32 {
+        self.grid().width()
+    }
+
+    /// Frame height in pixels.
+    pub fn height(&self) -> u32 {
+        self.grid().height()
+    }
+
+    /// The colour of pixel (`x`, `y`) of the frame.
+    pub fn get(&self, x: u32, y: u32) -> [f64; 3] {
+        let tile = self.grid().tile(x as u16, y as u16);
+        self.tile(tile).map_or(self.background, |t| t[TileGrid::within(x as u16, y as u16)])
+    }
+
+    /// The colour of tiles that nothing touched.
+    pub fn background(&self) -> [f64; 3] {
+        self.background
+    }
+
+    /// The pixels of `tile`, if it is touched.
+    pub fn tile(&self, tile: TileId) -> Option<&[[f64; 3]; TILE_PIXELS]> {
+        self.tiles.get(tile).map(|t| &**t)
+    }
+
+    /// The pixels of `tile`, to change.
+    pub fn tile_mut(&mut self, tile: TileId) -> &mut [[f64; 3]; TILE_PIXELS] {
+        let background = self.background;
+        self.tiles.get_or_insert_with(tile, || Box::new([background; TILE_PIXELS]))
+    }
+
+    /// The tiles that are touched in this picture or in `other`, in order.
+    pub fn tiles_with(&self, other: &Picture) -> Vec<TileId> {
+        let ids = |p: &Picture| p.tiles.touched().iter().map(|(id, _)| *id).collect::<Vec<_>>();
+        let mut all = [ids(self), ids(other)].concat();
+        all.sort_unstable();
+        all.dedup();
+        all
+    }
+
+    /// A picture with `change` applied to each pixel of this one and its
+    /// counterpart in `other`.
+    ///
+    /// # Panics
+    /// Where the frames differ in size.
+    pub fn zip(&self, other: &Picture, change: impl Fn([f64; 3], [f64; 3]) -> [f64; 3]) -> Picture {
+        assert_eq!(self.grid(), other.grid());
+        let mut result = Picture::new(self.grid(), change(self.background, other.background));
+        for id in self.tiles_with(other) {
+            let (a, b) = (self.tile(id), other.tile(id));
+            for (within, pixel) in result.tile_mut(id).iter_mut().enumerate() {
+                *pixel = change(
+                    a.map_or(self.background, |t| t[within]),
+                    b.map_or(other.background, |t| t[within]),
+                );
+            }
+        }
+        result
+    }
+
+    /// The BLAKE3 of all pixels' bits, row by row: equal for pictures that are
+    /// equal bit for bit.
+    pub fn hash(&self) -> String {
+        let mut hasher = blake3::Hasher::new();
+        for size in [self.width(), self.height()] {
+            hasher.update(&size.to_le_bytes());
+        }
+        let mut row = Vec::with_capacity(self.width() as usize * 24);
+        for y in 0..self.height() {
+            row.clear();
+            for x in 0..self.width() {
+                row.extend(self.get(x, y).iter().flat_map(|c| c.to_bits().to_le_bytes()));
+            }
+            hasher.update(&row);
+        }
+        hasher.finalize().to_hex().to_string()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn untouched_tiles_show_the_background() {
+        let grid = TileGrid::new(40, 20);
+        let mut picture = Picture::new(grid, [0.5; 3]);
+        picture.tile_mut(grid.tile(17, 3))[TileGrid::within(17, 3)] = [1.0, 2.0, 3.0];
+        assert_eq!(picture.get(17, 3), [1.0, 2.0, 3.0]);
+        assert_eq!(picture.get(18, 3), [0.5; 3]);
+        assert_eq!(picture.get(0, 0), [0.5; 3]);
+        let full = Picture::from_fn(grid, |x, y| picture.get(x, y));
+        assert_eq!(full.hash(), picture.hash());
+        let difference = picture.zip(&full, |a, b| std::array::from_fn(|i| a[i] - b[i]));
+        assert_eq!(difference.get(17, 3), [0.0; 3]);
+        assert_eq!(difference.background(), [0.5; 3]);
+    }
+}

@@ -1,0 +1,194 @@
+//! The contract between a design and everything that replays it.
+
+use std::sync::Arc;
+
+use serde::Serialize;
+
+use crate::error::Result;
+use crate::param::{Param, Values};
+use crate::rop::event::Probe;
+use crate::rop::samples::SampleContents;
+use crate::tile::TileGrid;
+use crate::trace::{ColourFormat, Fragment, Trace};
+
+/// What a design knows of the frame it draws.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// The frame's tiles and size.
+    pub grid: TileGrid,
+    /// Where each pixel's samples lie, in 1/16 pixel from its centre.
+    pub positions: Arc<[[i8; 2]]>,
+    /// Linear colour of a cleared sample.
+    pub background: [f32; 3],
+    /// The run's seed.
+    pub seed: u32,
+    /// Bits that a stored colour takes.
+    pub colour_bits: u32,
+}
+
+impl Frame {
+    /// The frame of a replay of `trace` at `samples` samples.
+    ///
+    /// # Errors
+    /// As [`crate::trace::SamplePattern::prefix`].
+    pub fn of(trace: &Trace, samples: u32, seed: u32) -> Result<Self> {
+        let header = trace.header();
+        Ok(Frame {
+            grid: TileGrid::new(header.width, header.height),
+            positions: header.pattern.prefix(samples)?.into(),
+            background: header.background,
+            seed,
+            colour_bits: match header.colour {
+                ColourFormat::F16 => 48,
+                ColourFormat::F32 => 96,
+            },
+        })
+    }
+
+    /// Samples per pixel.
+    pub fn samples(&self) -> u32 {
+        self.positions.len() as u32
+    }
+}
+
+/// A pixel of the frame.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Site {
+    /// Column, from the left.
+    pub x: u16,
+    /// Row, from the top.
+    pub y: u16,
+}
+
+/// A design of a raster-operations unit, for pixels of a fixed number of samples.
+///
+/// The replay calls [`clear`](Design::clear) when a pixel's tile is touched for
+/// the first time, then, pass by pass, [`draw`](Design::draw) for each fragment
+/// in API order and [`end_pass`](Design::end_pass), then
+/// [`resolve`](Design::resolve). Pixels are independent: a design must not keep
+/// anything between calls outside the pixel's state, and all randomness must be
+/// a pure function of the frame's seed, the site, the fragment and the pass
+/// ([`crate::random`]). A fragment's coverage is never empty and names only the
+/// frame's samples.
+pub trait Design: Send + Sync {
+    /// The state of one pixel: what this design needs and nothing else.
+    type Pixel: Send;
+
+    /// How many times the design reads the trace.
+    fn passes(&self) -> u32 {
+        1
+    }
+
+    /// The bits of state that a pixel takes in hardware.
+    fn state_bits(&self) -> StateBits;
+
+    /// A pixel's state before the first fragment.
+    fn clear(&self, site: Site) -> Self::Pixel;
+
+    /// Draws one fragment, telling `probe` what happens.
+    fn draw<P: Probe>(
+        &self,
+        pass: u32,
+        site: Site,
+        pixel: &mut Self::Pixel,
+        fragment: &Fragment,
+        probe: &mut P,
+    );
+
+    /// Is called when all fragments of a pass have been drawn.
+    fn end_pass(&self, _pass: u32, _site: Site, _pixel: &mut Self::Pixel) {}
+
+    /// The pixel's linear colour over the background.
+    fn resolve(&self, site: Site, pixel: &Self::Pixel) -> [f64; 3];
+
+    /// The pixel's state as `explain` shows it.
+    fn contents(&self, pixel: &Self::Pixel) -> Contents;
+
+    /// Bytes that the state grows by with each fragment, where it grows; the
+    /// replay then works in groups of tiles that fit into its memory limit.
+    fn bytes_per_fragment(&self) -> Option<usize> {
+        None
+    }
+}
+
+/// Bits of state per pixel, as hardware would hold them.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize)]
+pub struct StateBits {
+    /// The multisample buffer: depths and colours of all samples.
+    pub samples: u32,
+    /// What the design keeps beside it.
+    pub extra: u32,
+    /// Whether it grows with the fragments: the figures are then for none.
+    pub unbounded: bool,
+}
+
+impl StateBits {
+    /// All bits together.
+    pub fn total(&self) -> u32 {
+        self.samples + self.extra
+    }
+}
+
+/// A pixel's state for people.
+#[derive(Clone, PartialEq, Debug, Default, Serialize)]
+pub struct Contents {
+    /// What its samples hold, where the design has samples.
+    pub samples: Vec<SampleContents>,
+    /// Names and values of what else it holds.
+    pub fields: Vec<(&'static str, String)>,
+}
+
+/// What a design promises; the conformance suite holds it to each of these, and
+/// shows that what is not promised does not hold.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+pub struct Promises {
+    /// Its expectation over seeds is the exact picture.
+    pub unbiased: bool,
+    /// Its picture approaches the exact one as samples increase.
+    pub consistent: bool,
+    /// The order in which fragments of different depths arrive changes no bit.
+    pub order_independent: bool,
+}
+
+/// How designs are grouped in listings.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Family {
+    /// The answer that others are measured against.
+    Reference,
+    /// Random coverage of samples and an ordinary depth test.
+    Stochastic,
+}
+
+/// What a listing says about a design.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Info {
+    /// Its name, as in `--design NAME`.
+    pub name: &'static str,
+    /// Its family.
+    pub family: Family,
+    /// What it does, in a line.
+    pub summary: &'static str,
+    /// Where it was published.
+    pub citation: &'static str,
+    /// Its parameters.
+    pub params: &'static [Param],
+}
+
+/// A design with its parameters still open: what the registry holds.
+pub trait Blueprint: 'static {
+    /// What a listing says about it.
+    const INFO: Info;
+
+    /// The design for pixels of `N` samples.
+    type At<const N: usize>: Design;
+
+    /// Builds the design.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Config`] for values that contradict each other.
+    fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>>;
+
+    /// What it promises with these parameters.
+    fn promises(values: &Values) -> Promises;
+}

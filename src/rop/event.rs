@@ -1,0 +1,205 @@
+//! What a raster-operations unit does, as countable events.
+
+use serde::Serialize;
+
+use crate::rop::opacity::Threshold;
+use crate::trace::{MAX_SAMPLES, SampleMask};
+
+/// Is told what a design does while it draws. The methods do nothing unless they
+/// are overridden: with [`NoProbe`] they vanish from the compiled code.
+pub trait Probe {
+    /// A fragment reached the pixel, covering these samples.
+    fn fragment(&mut self, _covered: SampleMask) {}
+    /// These of its samples passed the depth test.
+    fn passed(&mut self, _samples: SampleMask) {}
+    /// The fragment starts a new surface with this number.
+    fn surface(&mut self, _number: u32) {}
+    /// Samples were sorted; this is their order now.
+    fn sorted(&mut self, _order: &[u8]) {}
+    /// Sample `sample` got reference value `value` as the `number`-th of its
+    /// surface and was held against `threshold`.
+    fn reference(&mut self, _sample: u8, _number: u32, _value: u32, _threshold: Threshold) {}
+    /// `count` hashes were evaluated.
+    fn hashed(&mut self, _count: u32) {}
+    /// The fragment was written to these samples.
+    fn written(&mut self, _samples: SampleMask) {}
+    /// State bits of the pixel were read and written.
+    fn state(&mut self, _read: u32, _written: u32) {}
+}
+
+/// Counts nothing and costs nothing.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoProbe;
+
+impl Probe for NoProbe {}
+
+/// How often each event happened over a replay.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct EventCounts {
+    /// Fragments drawn; over several passes each counts several times.
+    pub fragments: u64,
+    /// Samples that fragments covered, each put to the depth test.
+    pub samples_tested: u64,
+    /// Samples that passed it.
+    pub samples_passed: u64,
+    /// Samples written.
+    pub samples_written: u64,
+    /// Hashes evaluated.
+    pub hashes: u64,
+    /// Sorts of two or more samples; entry `i` counts those of `i` samples.
+    pub sorts_by_length: Vec<u64>,
+    /// New surfaces started.
+    pub surfaces: u64,
+    /// Bits of pixel state read.
+    pub state_bits_read: u64,
+    /// Bits of pixel state written.
+    pub state_bits_written: u64,
+}
+
+impl Default for EventCounts {
+    fn default() -> Self {
+        EventCounts {
+            fragments: 0,
+            samples_tested: 0,
+            samples_passed: 0,
+            samples_written: 0,
+            hashes: 0,
+            sorts_by_length: vec![0; MAX_SAMPLES as usize + 1],
+            surfaces: 0,
+            state_bits_read: 0,
+            state_bits_written: 0,
+        }
+    }
+}
+
+impl EventCounts {
+    /// How many sorts there were.
+    pub fn sorts(&self) -> u64 {
+        self.sorts_by_length.iter().sum()
+    }
+
+    /// Bytes of pixel state read and written.
+    pub fn state_bytes(&self) -> [u64; 2] {
+        [self.state_bits_read.div_ceil(8), self.state_bits_written.div_ceil(8)]
+    }
+
+    /// These counts and those of another part of the same replay.
+    pub fn merged(mut self, other: &Self) -> Self {
+        self.fragments += other.fragments;
+        self.samples_tested += other.samples_tested;
+        self.samples_passed += other.samples_passed;
+        self.samples_written += other.samples_written;
+        self.hashes += other.hashes;
+        for (sum, count) in self.sorts_by_length.iter_mut().zip(&other.sorts_by_length) {
+            *sum += count;
+        }
+        self.surfaces += other.surfaces;
+        self.state_bits_read += other.state_bits_read;
+        self.state_bits_written += other.state_bits_written;
+        self
+    }
+}
+
+impl Probe for EventCounts {
+    #[inline]
+    fn fragment(&mut self, covered: SampleMask) {
+        self.fragments += 1;
+        self.samples_tested += u64::from(covered.count());
+    }
+    #[inline]
+    fn passed(&mut self, samples: SampleMask) {
+        self.samples_passed += u64::from(samples.count());
+    }
+    #[inline]
+    fn surface(&mut self, _number: u32) {
+        self.surfaces += 1;
+    }
+    #[inline]
+    fn sorted(&mut self, order: &[u8]) {
+        if order.len() > 1 {
+            self.sorts_by_length[order.len()] += 1;
+        }
+    }
+    #[inline]
+    fn hashed(&mut self, count: u32) {
+        self.hashes += u64::from(count);
+    }
+    #[inline]
+    fn written(&mut self, samples: SampleMask) {
+        self.samples_written += u64::from(samples.count());
+    }
+    #[inline]
+    fn state(&mut self, read: u32, written: u32) {
+        self.state_bits_read += u64::from(read);
+        self.state_bits_written += u64::from(written);
+    }
+}
+
+/// Writes down what happened to one fragment, for `explain`.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Record {
+    /// Samples that the fragment covers.
+    pub covered: SampleMask,
+    /// Samples that passed the depth test; `None` where the design makes none.
+    pub passed: Option<SampleMask>,
+    /// The new surface's number, where one was started.
+    pub surface: Option<u32>,
+    /// The samples' order after sorting, where they were sorted.
+    pub order: Option<Vec<u8>>,
+    /// The opacity tests in the order in which they were made.
+    pub references: Vec<ReferenceRecord>,
+    /// Samples written.
+    pub written: SampleMask,
+    /// Hashes evaluated.
+    pub hashes: u32,
+    /// Bits of pixel state read.
+    pub state_bits_read: u32,
+    /// Bits of pixel state written.
+    pub state_bits_written: u32,
+}
+
+/// One opacity test.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct ReferenceRecord {
+    /// The sample.
+    pub sample: u8,
+    /// Its number within its surface.
+    pub number: u32,
+    /// Its reference value, as a fraction of 1.
+    pub value: f64,
+    /// Whether it passed.
+    pub passed: bool,
+}
+
+impl Probe for Record {
+    fn fragment(&mut self, covered: SampleMask) {
+        self.covered = covered;
+    }
+    fn passed(&mut self, samples: SampleMask) {
+        self.passed = Some(samples);
+    }
+    fn surface(&mut self, number: u32) {
+        self.surface = Some(number);
+    }
+    fn sorted(&mut self, order: &[u8]) {
+        self.order = Some(order.to_vec());
+    }
+    fn reference(&mut self, sample: u8, number: u32, value: u32, threshold: Threshold) {
+        self.references.push(ReferenceRecord {
+            sample,
+            number,
+            value: f64::from(value) / 4_294_967_296.0,
+            passed: threshold.passes(value),
+        });
+    }
+    fn hashed(&mut self, count: u32) {
+        self.hashes += count;
+    }
+    fn written(&mut self, samples: SampleMask) {
+        self.written |= samples;
+    }
+    fn state(&mut self, read: u32, written: u32) {
+        self.state_bits_read += read;
+        self.state_bits_written += written;
+    }
+}

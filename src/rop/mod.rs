@@ -1,0 +1,23 @@
+//! What the raster-operations units share: pixel state, surface tracking, sample
+//! order, reference values, event counts, and the replay.
+
+pub mod depth_bits;
+mod design;
+mod event;
+mod opacity;
+mod pixel_order;
+mod reference_value;
+mod replay;
+mod samples;
+mod surface;
+
+pub use design::{Blueprint, Contents, Design, Family, Frame, Info, Promises, Site, StateBits};
+pub use event::{EventCounts, NoProbe, Probe, Record, ReferenceRecord};
+pub use opacity::Threshold;
+pub use pixel_order::{PixelIndex, PixelOrder};
+pub use reference_value::{Reference, ReferenceKey, scramble_lk2011};
+pub use replay::{Explanation, ReplayOptions, Replayed, Step, draw_pixel, explain, replay};
+pub use samples::{
+    SampleContents, SampleList, Samples, in_sample_order, sample_depths, sort_by_stored_depth,
+};
+pub use surface::{CoveredMask, SurfaceRule, SurfaceTracker};

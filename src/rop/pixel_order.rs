@@ -1,0 +1,112 @@
+//! Numbering the pixels of a frame.
+
+crate::options! {
+    /// The curve along which pixels are numbered.
+    pub enum PixelOrder {
+        Hilbert = "hilbert": "along a Hilbert curve: near numbers are near pixels",
+        Morton = "morton": "along a Z curve: even and odd rows get different expectations (LK section 3.1)",
+        Scanline = "scanline": "row by row",
+    }
+}
+
+/// A pixel's number along a curve over the smallest power-of-two square that
+/// holds the frame: below 2^32, as a frame's sides are at most 2^16.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+pub struct PixelIndex(pub u32);
+
+impl PixelOrder {
+    /// The number of pixel (`x`, `y`) of a frame of `width` × `height` pixels.
+    pub fn index(self, x: u16, y: u16, width: u32, height: u32) -> PixelIndex {
+        let bits = width.max(height).next_power_of_two().trailing_zeros();
+        let (x, y) = (u32::from(x), u32::from(y));
+        PixelIndex(match self {
+            PixelOrder::Hilbert => hilbert(x, y, bits),
+            PixelOrder::Morton => spread(x) | spread(y) << 1,
+            PixelOrder::Scanline => (y << bits.min(16)).wrapping_add(x),
+        })
+    }
+}
+
+/// The distance along the Hilbert curve of order `bits` that starts at (0, 0) and
+/// ends at the right end of row 0.
+fn hilbert(mut x: u32, mut y: u32, bits: u32) -> u32 {
+    let mut distance = 0;
+    for bit in (0..bits).rev() {
+        let (right, down) = (x >> bit & 1, y >> bit & 1);
+        // The quadrants in the curve's order: 0 (left, up), 1 (left, down),
+        // 2 (right, down), 3 (right, up).
+        distance = distance << 2 | (3 * right ^ down);
+        // The first and the last quadrant hold the curve mirrored.
+        if down == 0 {
+            if right == 1 {
+                (x, y) = (!x, !y);
+            }
+            (x, y) = (y, x);
+        }
+    }
+    distance
+}
+
+/// Puts a zero before each of the lower 16 bits.
+fn spread(v: u32) -> u32 {
+    let v = (v | v << 8) & 0x00ff_00ff;
+    let v = (v | v << 4) & 0x0f0f_0f0f;
+    let v = (v | v << 2) & 0x3333_3333;
+    (v | v << 1) & 0x5555_5555
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ORDERS: [PixelOrder; 3] = [PixelOrder::Hilbert, PixelOrder::Morton, PixelOrder::Scanline];
+
+    #[test]
+    fn every_order_numbers_a_square_through() {
+        for side in [1_u32, 2, 8, 64] {
+            for order in ORDERS {
+                let mut seen = vec![false; (side * side) as usize];
+                for y in 0..side {
+                    for x in 0..side {
+                        let PixelIndex(i) = order.index(x as u16, y as u16, side, side);
+                        assert!(!std::mem::replace(&mut seen[i as usize], true));
+                    }
+                }
+                assert!(seen.iter().all(|s| *s));
+            }
+        }
+    }
+
+    #[test]
+    fn neighbours_on_the_hilbert_curve_are_neighbours_in_the_frame() {
+        let side = 64;
+        let mut place = vec![(0, 0); side * side];
+        for y in 0..side {
+            for x in 0..side {
+                place[hilbert(x as u32, y as u32, 6) as usize] = (x as i32, y as i32);
+            }
+        }
+        assert_eq!((place[0], place[side * side - 1]), ((0, 0), (63, 0)));
+        for pair in place.windows(2) {
+            let ((ax, ay), (bx, by)) = (pair[0], pair[1]);
+            assert_eq!((ax - bx).abs() + (ay - by).abs(), 1);
+        }
+    }
+
+    #[test]
+    fn the_largest_frame_fits() {
+        for order in ORDERS {
+            let corner = |x, y| order.index(x, y, 1 << 16, 1 << 16).0;
+            let mut corners =
+                [(0, 0), (0, 65535), (65535, 0), (65535, 65535)].map(|(x, y)| corner(x, y));
+            corners.sort_unstable();
+            assert!(corners.windows(2).all(|w| w[0] < w[1]));
+            assert_eq!((corners[0], corners[3] == u32::MAX), (0, true));
+        }
+    }
+
+    #[test]
+    fn morton_interleaves() {
+        assert_eq!(PixelOrder::Morton.index(0b101, 0b011, 8, 8), PixelIndex(0b01_10_11));
+    }
+}

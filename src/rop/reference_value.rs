@@ -1,0 +1,163 @@
+//! Opacity reference values (Laine and Karras 2011, section 3).
+
+use crate::random::{hash, scatter};
+use crate::rop::pixel_order::PixelIndex;
+
+crate::options! {
+    /// How reference values are made.
+    pub enum Reference {
+        Lk2011 = "lk2011": "four multiply-XOR rounds (LK figure 4)",
+        RadicalInverse = "radical-inverse": "no scrambling: surfaces stay correlated (LK section 3)",
+        Sobol = "sobol": "each bit flipped by an AND-parity of those below (LK figure 3b)",
+        White = "white": "independent random numbers: no stratification",
+    }
+}
+
+/// What a reference value is made of, but for the sample's number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ReferenceKey {
+    /// The pixel's number along its curve.
+    pub pixel: PixelIndex,
+    /// The surface's number within the pixel.
+    pub surface: u32,
+    /// The run's seed; 0 gives the publication's own sequence.
+    pub seed: u32,
+}
+
+impl Reference {
+    /// The reference value of sample number `n` of a pixel with `samples` samples:
+    /// a 32-bit fraction of 1.
+    #[inline]
+    pub fn value(self, n: u32, samples: u32, key: &ReferenceKey) -> u32 {
+        if self == Reference::White {
+            return hash([key.seed, key.pixel.0, key.surface, n]);
+        }
+        let x = jump(n, samples, key);
+        match self {
+            Reference::Lk2011 => scramble_lk2011(x),
+            Reference::Sobol => scramble_sobol(x),
+            Reference::RadicalInverse | Reference::White => x,
+        }
+    }
+}
+
+/// LK figure 4, lines 1 and 2: the reversed bits of the place in the sequence,
+/// moved on by the surface.
+///
+/// The publication's 32-bit index wraps on frames of more than 2^32 samples. Here
+/// it is 64 bits wide; what lies above 32 bits, like the seed, moves the sequence
+/// to an unrelated place, and 0 leaves it where figure 4 has it.
+#[inline]
+fn jump(n: u32, samples: u32, key: &ReferenceKey) -> u32 {
+    let index = u64::from(n) + u64::from(key.pixel.0) * u64::from(samples);
+    let moved =
+        key.surface.wrapping_add(scatter(key.seed)).wrapping_add(scatter((index >> 32) as u32));
+    (index as u32).reverse_bits().wrapping_add(moved)
+}
+
+/// LK figure 4, lines 3 to 6.
+#[inline]
+pub const fn scramble_lk2011(mut x: u32) -> u32 {
+    x ^= x.wrapping_mul(0x6c50_b47c);
+    x ^= x.wrapping_mul(0xb82f_1e52);
+    x ^= x.wrapping_mul(0xc7af_e638);
+    x ^ x.wrapping_mul(0x8d22_f6e6)
+}
+
+/// The second dimension of the Sobol' sequence as a scrambling of the first: bit
+/// `b` of the result is the parity of an AND of the word with a constant.
+fn scramble_sobol(x: u32) -> u32 {
+    let (mut direction, mut result) = (1_u32 << 31, 0);
+    for bit in (0..32).rev() {
+        if x >> bit & 1 == 1 {
+            result ^= direction;
+        }
+        direction ^= direction >> 1;
+    }
+    result
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::param::Options;
+
+    fn key(pixel: u32, surface: u32, seed: u32) -> ReferenceKey {
+        ReferenceKey { pixel: PixelIndex(pixel), surface, seed }
+    }
+
+    #[test]
+    fn lk2011_is_figure_4_word_for_word() {
+        // Figure 4 with nothing of ours: 32 bits, no seed.
+        let figure_4 = |sample_id: u32, pixel_id: u32, surface_id: u32, samples_per_pixel: u32| {
+            let mut x = sample_id.wrapping_add(pixel_id.wrapping_mul(samples_per_pixel));
+            x = x.reverse_bits().wrapping_add(surface_id);
+            x ^= x.wrapping_mul(0x6C50B47C);
+            x ^= x.wrapping_mul(0xB82F1E52);
+            x ^= x.wrapping_mul(0xC7AFE638);
+            x ^= x.wrapping_mul(0x8D22F6E6);
+            x
+        };
+        for samples in [1, 4, 64] {
+            for pixel in [0, 1, 77, 1 << 20] {
+                for surface in [0, 1, 2, 1000] {
+                    for n in 0..samples {
+                        let ours = Reference::Lk2011.value(n, samples, &key(pixel, surface, 0));
+                        assert_eq!(ours, figure_4(n, pixel, surface, samples));
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_radical_inverse_is_the_table_of_section_3() {
+        let values: Vec<f64> = (0..8)
+            .map(|n| {
+                f64::from(Reference::RadicalInverse.value(n, 8, &key(0, 0, 0))) / 2_f64.powi(32)
+            })
+            .collect();
+        assert_eq!(values, [0.0, 0.5, 0.25, 0.75, 0.125, 0.625, 0.375, 0.875]);
+    }
+
+    #[test]
+    fn every_aligned_span_is_stratified_but_for_white_noise() {
+        for reference in Reference::ALL {
+            let mut broken = 0;
+            for (surface, seed) in [(0, 0), (1, 0), (5, 9), (1 << 20, 12345)] {
+                for pixel in [0, 3, 1000, (1 << 31) + 5] {
+                    for bits in 0..=6 {
+                        let mut strata: Vec<u32> = (0..1 << bits)
+                            .map(|n| {
+                                let x = reference.value(n, 64, &key(pixel, surface, seed));
+                                u64::from(x) as u32 >> (32 - bits.max(1)) >> u32::from(bits == 0)
+                            })
+                            .collect();
+                        strata.sort_unstable();
+                        broken += u32::from(strata != (0..1 << bits).collect::<Vec<_>>());
+                    }
+                }
+            }
+            assert_eq!(broken > 0, *reference == Reference::White, "{reference:?}: {broken}");
+        }
+    }
+
+    #[test]
+    fn neighbouring_pixels_share_the_strata() {
+        // Spatial stratification: the 4 aligned pixels of a block of 8 samples each
+        // have all 32 strata once.
+        for reference in [Reference::Lk2011, Reference::Sobol] {
+            let mut strata: Vec<u32> =
+                (0..32).map(|i| reference.value(i % 8, 8, &key(40 + i / 8, 3, 7)) >> 27).collect();
+            strata.sort_unstable();
+            assert_eq!(strata, (0..32).collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn large_frames_do_not_wrap() {
+        // Pixels 2^26 apart at 64 samples would share an index of 32 bits.
+        let value = |pixel| Reference::Lk2011.value(0, 64, &key(pixel, 0, 0));
+        assert_ne!(value(5), value(5 + (1 << 26)));
+    }
+}

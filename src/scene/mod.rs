@@ -1,0 +1,320 @@
+//! Scenes: triangles, strands and particles with their materials, from files
+//! and from built-in generators.
+//!
+//! A scene knows nothing of pixels. [`load`] takes either the name of a file
+//! (OBJ, glTF, GLB) or `builtin:NAME`.
+
+pub mod builtin;
+mod gltf_file;
+mod material;
+mod obj_file;
+mod texture;
+
+use std::path::Path;
+
+use glam::{DAffine3, DVec3, Vec2, Vec3, Vec4};
+
+pub use material::{AlphaMode, Material, TextureUse};
+pub use texture::{Texture, Wrap};
+
+use crate::error::{Error, Result};
+
+/// A scene: objects that draw shapes with materials.
+#[derive(Clone, Debug, Default)]
+pub struct Scene {
+    /// Where it comes from: a file's name, or a built-in with its parameters.
+    pub source: String,
+    /// Objects in API order.
+    pub objects: Vec<Object>,
+    /// What the objects place.
+    pub shapes: Vec<Shape>,
+    /// What the shapes are made of; never empty in a loaded scene.
+    pub materials: Vec<Material>,
+    /// What the materials show.
+    pub textures: Vec<Texture>,
+    /// From where it is best seen.
+    pub view: View,
+    /// What could not be honoured, for the user to know.
+    pub warnings: Vec<String>,
+}
+
+/// A shape at its place in the scene.
+#[derive(Clone, Debug)]
+pub struct Object {
+    /// Its name, for people.
+    pub name: String,
+    /// Which of [`Scene::shapes`].
+    pub shape: usize,
+    /// From the shape's space to the scene's.
+    pub place: DAffine3,
+}
+
+/// Something to draw.
+#[derive(Clone, Debug)]
+pub enum Shape {
+    /// A triangle mesh.
+    Mesh(Mesh),
+    /// Thin ribbons that face the camera.
+    Strands(Strands),
+    /// Squares that face the camera.
+    Particles(Particles),
+}
+
+impl Shape {
+    /// How many triangles it draws.
+    pub fn triangle_count(&self) -> usize {
+        match self {
+            Shape::Mesh(mesh) => mesh.triangles.len(),
+            Shape::Strands(strands) => strands.segment_count() * 2,
+            Shape::Particles(particles) => particles.centres.len() * 2,
+        }
+    }
+
+    /// Which of [`Scene::materials`] it is made of.
+    pub fn material(&self) -> usize {
+        match self {
+            Shape::Mesh(mesh) => mesh.material,
+            Shape::Strands(strands) => strands.material,
+            Shape::Particles(particles) => particles.material,
+        }
+    }
+
+    /// Points that bound it, each with a radius around it.
+    fn bounding_points(&self) -> Box<dyn Iterator<Item = (Vec3, f32)> + '_> {
+        match self {
+            Shape::Mesh(mesh) => Box::new(
+                mesh.triangles.iter().flatten().map(|i| (mesh.positions[*i as usize], 0.0)),
+            ),
+            Shape::Strands(s) => Box::new(s.points.iter().copied().zip(s.radii.iter().copied())),
+            Shape::Particles(p) => Box::new(
+                // A square's corner is further from its centre than its side.
+                p.centres.iter().copied().zip(p.sizes.iter().map(|s| s * std::f32::consts::SQRT_2)),
+            ),
+        }
+    }
+}
+
+/// A triangle mesh. The optional attributes are empty, or one for each position.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// Vertex positions.
+    pub positions: Vec<Vec3>,
+    /// Vertex normals; a mesh without them is shaded flat.
+    pub normals: Vec<Vec3>,
+    /// Texture coordinates, (0, 0) at the texture's top left.
+    pub uvs: Vec<Vec2>,
+    /// Linear colours and alphas, multiplied into the material's.
+    pub colours: Vec<Vec4>,
+    /// Vertex numbers, three a triangle, in API order.
+    pub triangles: Vec<[u32; 3]>,
+    /// Which of [`Scene::materials`].
+    pub material: usize,
+}
+
+/// Curves drawn as ribbons that face the camera.
+#[derive(Clone, Debug, Default)]
+pub struct Strands {
+    /// Points along all curves, curve after curve.
+    pub points: Vec<Vec3>,
+    /// Half of the ribbon's width at each point.
+    pub radii: Vec<f32>,
+    /// Linear colours, one for each curve, multiplied into the material's.
+    pub colours: Vec<Vec4>,
+    /// The first point of each curve, and at the end the number of points; each
+    /// curve has at least two.
+    pub starts: Vec<u32>,
+    /// Which of [`Scene::materials`].
+    pub material: usize,
+}
+
+impl Strands {
+    /// How many curves there are.
+    pub fn strand_count(&self) -> usize {
+        self.starts.len().saturating_sub(1)
+    }
+
+    /// How many straight pieces the curves have.
+    pub fn segment_count(&self) -> usize {
+        self.points.len() - self.strand_count()
+    }
+}
+
+/// Squares that face the camera.
+#[derive(Clone, Debug, Default)]
+pub struct Particles {
+    /// Centres.
+    pub centres: Vec<Vec3>,
+    /// Half of the side.
+    pub sizes: Vec<f32>,
+    /// Turn around the axis towards the camera, in radians.
+    pub angles: Vec<f32>,
+    /// Linear colours and alphas, multiplied into the material's.
+    pub colours: Vec<Vec4>,
+    /// Which of [`Scene::materials`].
+    pub material: usize,
+}
+
+/// From where a scene is best seen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// Degrees that the camera stands to the right of the scene's front (+z).
+    pub yaw: f64,
+    /// Degrees that it stands above the horizontal.
+    pub pitch: f64,
+    /// Whether parallel lines stay parallel.
+    pub orthographic: bool,
+    /// Linear colour behind the scene.
+    pub background: [f32; 3],
+    /// What the frame shows, where it is not the whole scene: the half-extents
+    /// of a centred rectangle in the plane facing the camera.
+    pub frame: Option<[f64; 2]>,
+}
+
+impl Default for View {
+    fn default() -> Self {
+        View { yaw: 30.0, pitch: 20.0, orthographic: false, background: [0.0; 3], frame: None }
+    }
+}
+
+impl Scene {
+    /// How many triangles it draws.
+    pub fn triangle_count(&self) -> usize {
+        self.objects.iter().map(|o| self.shapes[o.shape].triangle_count()).sum()
+    }
+
+    /// All points that bound the scene, each with a radius around it.
+    pub fn bounding_points(&self) -> impl Iterator<Item = (DVec3, f64)> + '_ {
+        self.objects.iter().flat_map(|object| {
+            // The largest stretch of any direction bounds how a radius grows.
+            let matrix = object.place.matrix3;
+            let stretch = matrix.x_axis.length().max(matrix.y_axis.length());
+            let stretch = stretch.max(matrix.z_axis.length());
+            self.shapes[object.shape].bounding_points().map(move |(point, radius)| {
+                (object.place.transform_point3(point.as_dvec3()), f64::from(radius) * stretch)
+            })
+        })
+    }
+
+    /// Adds a shape and an object that places it as it is.
+    pub fn add(&mut self, name: impl Into<String>, shape: Shape) {
+        self.objects.push(Object {
+            name: name.into(),
+            shape: self.shapes.len(),
+            place: DAffine3::IDENTITY,
+        });
+        self.shapes.push(shape);
+    }
+
+    /// Checks that the scene can be drawn: indices in range, numbers finite,
+    /// something there at all.
+    fn check(&mut self) -> Result<()> {
+        let source = &self.source;
+        for object in &self.objects {
+            let place = format!("{source}, object '{}'", object.name);
+            if !object.place.is_finite() {
+                let hint = "correct its transformation";
+                return Err(Error::invalid(place, "it stands at no finite place", hint));
+            }
+            match &self.shapes[object.shape] {
+                Shape::Mesh(mesh) => check_mesh(mesh, &place)?,
+                Shape::Strands(s) => check_points(&s.points, &place)?,
+                Shape::Particles(p) => check_points(&p.centres, &place)?,
+            }
+        }
+        if self.triangle_count() == 0 {
+            let hint = "give a scene with at least one triangle";
+            return Err(Error::invalid(source, "the scene has no triangles", hint));
+        }
+        if u32::try_from(self.triangle_count()).is_err() {
+            let hint = "split the scene";
+            return Err(Error::unsupported(source, "it has more than 2^32 triangles", hint));
+        }
+        Ok(())
+    }
+}
+
+fn check_points(points: &[Vec3], place: &str) -> Result<()> {
+    match points.iter().position(|p| !p.is_finite()) {
+        None => Ok(()),
+        Some(i) => Err(Error::invalid(
+            place,
+            format_args!("vertex {i} is {}, which is no finite place", points[i]),
+            "correct the vertex",
+        )),
+    }
+}
+
+fn check_mesh(mesh: &Mesh, place: &str) -> Result<()> {
+    check_points(&mesh.positions, place)?;
+    let count = mesh.positions.len();
+    let bad = mesh.triangles.iter().position(|t| t.iter().any(|i| *i as usize >= count));
+    if let Some(triangle) = bad {
+        return Err(Error::invalid(
+            place,
+            format_args!(
+                "triangle {triangle} names vertices {:?} of only {count}",
+                mesh.triangles[triangle]
+            ),
+            "correct the indices",
+        ));
+    }
+    for (name, length) in [
+        ("normals", mesh.normals.len()),
+        ("texture coordinates", mesh.uvs.len()),
+        ("colours", mesh.colours.len()),
+    ] {
+        if length != 0 && length != count {
+            return Err(Error::invalid(
+                place,
+                format_args!("it has {count} vertices and {length} {name}"),
+                "give one for each vertex, or none",
+            ));
+        }
+    }
+    let finite = mesh.uvs.iter().all(|v| v.is_finite())
+        && mesh.normals.iter().all(|v| v.is_finite())
+        && mesh.colours.iter().all(|v| v.is_finite());
+    if !finite {
+        let what = "a normal, texture coordinate or colour is not finite";
+        return Err(Error::invalid(place, what, "correct the vertex"));
+    }
+    Ok(())
+}
+
+/// Loads the scene that `source` names: `builtin:NAME[:key=value,…]`, or a file
+/// whose ending says its format.
+///
+/// # Errors
+/// [`Error::Config`] for an unknown built-in or ending, [`Error::Io`] where the
+/// file cannot be read, [`Error::Invalid`] where it is damaged or holds nothing
+/// to draw.
+pub fn load(source: &str) -> Result<Scene> {
+    let mut scene = match source.strip_prefix("builtin:") {
+        Some(spec) => builtin::build(spec)?,
+        None => {
+            let path = Path::new(source);
+            let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("");
+            match ending.to_ascii_lowercase().as_str() {
+                "obj" => obj_file::load(path)?,
+                "gltf" | "glb" => gltf_file::load(path)?,
+                other => {
+                    return Err(Error::config(
+                        format_args!("'{source}': scenes do not come as '.{other}'"),
+                        "give a .obj, .gltf or .glb file, or builtin:NAME",
+                    ));
+                }
+            }
+        }
+    };
+    if scene.materials.is_empty() {
+        scene.materials.push(Material::default());
+    }
+    scene.check()?;
+    Ok(scene)
+}
+
+/// The name under which a file appears in traces: without its folders, so that a
+/// trace does not depend on where its scene lay.
+fn file_name(path: &Path) -> String {
+    path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+}

@@ -1,0 +1,282 @@
+//! Textures with mip levels, filtered in linear light.
+
+use std::path::Path;
+
+use glam::{Vec2, Vec4};
+use image::{DynamicImage, ImageReader, Limits};
+
+use crate::error::{Error, Result};
+use crate::picture::srgb;
+
+/// The largest side of a texture that is read.
+const MAX_SIDE: u32 = 16384;
+/// The most memory that decoding one texture may take, in bytes.
+const MAX_DECODE_BYTES: u64 = 1 << 30;
+
+/// What lies beyond a texture's edge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum Wrap {
+    /// The texture again.
+    #[default]
+    Repeat,
+    /// The texture mirrored.
+    Mirror,
+    /// Its last texel.
+    Clamp,
+}
+
+/// A texture: linear colours multiplied by alpha, in 16 bits a channel, so that
+/// filtering leaves no fringes around cut-outs; level 0 and all its mip levels.
+#[derive(Clone)]
+pub struct Texture {
+    levels: Vec<Level>,
+    wrap: [Wrap; 2],
+    has_alpha: bool,
+}
+
+#[derive(Clone)]
+struct Level {
+    width: u32,
+    height: u32,
+    texels: Vec<[u16; 4]>,
+}
+
+const UNORM16: f32 = 65535.0;
+
+impl std::fmt::Debug for Texture {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Texture({}x{})", self.width(), self.height())
+    }
+}
+
+impl Texture {
+    /// A texture whose texel (x, y) has the linear colour and the alpha (not
+    /// multiplied) that `texel` gives, each in [0, 1].
+    ///
+    /// # Panics
+    /// Where a side is 0 or above 16384.
+    pub fn from_fn(width: u32, height: u32, mut texel: impl FnMut(u32, u32) -> Vec4) -> Self {
+        assert!((1..=MAX_SIDE).contains(&width) && (1..=MAX_SIDE).contains(&height));
+        let mut has_alpha = false;
+        let mut texels = Vec::with_capacity(width as usize * height as usize);
+        for y in 0..height {
+            for x in 0..width {
+                let c = texel(x, y).clamp(Vec4::ZERO, Vec4::ONE);
+                has_alpha |= c.w < 1.0;
+                let premultiplied = (c.truncate() * c.w).extend(c.w);
+                texels.push((premultiplied * UNORM16 + 0.5).to_array().map(|v| v as u16));
+            }
+        }
+        let mut levels = vec![Level { width, height, texels }];
+        while let Some(next) = levels.last().and_then(Level::halved) {
+            levels.push(next);
+        }
+        Texture { levels, wrap: [Wrap::Repeat; 2], has_alpha }
+    }
+
+    /// The same texture with other rules beyond its edges, horizontally and
+    /// vertically.
+    pub fn wrapped(mut self, wrap: [Wrap; 2]) -> Self {
+        self.wrap = wrap;
+        self
+    }
+
+    /// Decodes a PNG or JPEG; colours are taken as sRGB. `place` names it in errors.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] where it cannot be decoded, or is too large.
+    pub fn decode(bytes: &[u8], place: &str) -> Result<Self> {
+        let bad = |e: &dyn std::fmt::Display| {
+            Error::invalid(place, format_args!("the texture cannot be decoded ({e})"), "replace it")
+        };
+        let reader = ImageReader::new(std::io::Cursor::new(bytes));
+        let mut reader = reader.with_guessed_format().map_err(|e| bad(&e))?;
+        let mut limits = Limits::no_limits();
+        limits.max_image_width = Some(MAX_SIDE);
+        limits.max_image_height = Some(MAX_SIDE);
+        limits.max_alloc = Some(MAX_DECODE_BYTES);
+        reader.limits(limits);
+        let image = reader.decode().map_err(|e| bad(&e))?;
+        if image.width() == 0 || image.height() == 0 {
+            return Err(bad(&"it has no texels"));
+        }
+        Ok(Self::from_image(&image))
+    }
+
+    /// Reads a PNG or JPEG file.
+    ///
+    /// # Errors
+    /// [`Error::Io`] where it cannot be read; as [`Texture::decode`].
+    pub fn read(path: &Path) -> Result<Self> {
+        let bytes = std::fs::read(path).map_err(|e| Error::io("read", path, e))?;
+        Self::decode(&bytes, &path.display().to_string())
+    }
+
+    fn from_image(image: &DynamicImage) -> Self {
+        let rgba = image.to_rgba8();
+        Texture::from_fn(image.width(), image.height(), |x, y| {
+            let [r, g, b, a] = rgba.get_pixel(x, y).0;
+            let [r, g, b] = [r, g, b].map(|v| srgb::decode(f64::from(v) / 255.0) as f32);
+            Vec4::new(r, g, b, f32::from(a) / 255.0)
+        })
+    }
+
+    /// Texels across.
+    pub fn width(&self) -> u32 {
+        self.levels[0].width
+    }
+
+    /// Texels down.
+    pub fn height(&self) -> u32 {
+        self.levels[0].height
+    }
+
+    /// Whether any texel has an alpha below 1.
+    pub fn has_alpha(&self) -> bool {
+        self.has_alpha
+    }
+
+    /// The texture's linear colour and alpha (not multiplied) at `uv`, filtered
+    /// linearly in both directions and between mip levels. `dx` and `dy` are the
+    /// changes of `uv` over one pixel to the right and downwards.
+    pub fn sample(&self, uv: Vec2, dx: Vec2, dy: Vec2) -> Vec4 {
+        let size = Vec2::new(self.width() as f32, self.height() as f32);
+        // The longer of the pixel's two sides in texels: OpenGL 4.6, section 8.14.
+        let footprint = (dx * size).length_squared().max((dy * size).length_squared());
+        let top = self.levels.len() - 1;
+        let level =
+            if footprint > 1.0 { (0.5 * libm::log2f(footprint)).min(top as f32) } else { 0.0 };
+        let (fine, blend) = (level as usize, level - (level as usize) as f32);
+        let mut colour = self.bilinear(fine, uv);
+        if blend > 0.0 && fine < top {
+            colour = colour.lerp(self.bilinear(fine + 1, uv), blend);
+        }
+        let alpha = colour.w;
+        if alpha > 0.0 { (colour.truncate() / alpha).extend(alpha) } else { Vec4::ZERO }
+    }
+
+    fn bilinear(&self, level: usize, uv: Vec2) -> Vec4 {
+        let level = &self.levels[level];
+        let (x0, x1, fx) = taps(uv.x, level.width, self.wrap[0]);
+        let (y0, y1, fy) = taps(uv.y, level.height, self.wrap[1]);
+        let top = level.texel(x0, y0).lerp(level.texel(x1, y0), fx);
+        let bottom = level.texel(x0, y1).lerp(level.texel(x1, y1), fx);
+        top.lerp(bottom, fy)
+    }
+}
+
+/// The two texels around a coordinate and the weight of the second.
+fn taps(coordinate: f32, size: u32, wrap: Wrap) -> (u32, u32, f32) {
+    let period = match wrap {
+        Wrap::Repeat | Wrap::Clamp => size as f32,
+        Wrap::Mirror => 2.0 * size as f32,
+    };
+    let mut at = coordinate * size as f32;
+    if wrap == Wrap::Clamp {
+        at = at.clamp(0.0, period);
+    } else {
+        // Keeps large coordinates of tiled textures precise.
+        at -= period * (at / period).floor();
+    }
+    let at = at - 0.5;
+    let low = at.floor();
+    let index = |i: f32| {
+        let (i, n) = (i as i64, i64::from(size));
+        let i = match wrap {
+            Wrap::Repeat => i.rem_euclid(n),
+            Wrap::Clamp => i.clamp(0, n - 1),
+            Wrap::Mirror => {
+                let i = i.rem_euclid(2 * n);
+                if i < n { i } else { 2 * n - 1 - i }
+            }
+        };
+        i as u32
+    };
+    (index(low), index(low + 1.0), at - low)
+}
+
+impl Level {
+    fn texel(&self, x: u32, y: u32) -> Vec4 {
+        let [r, g, b, a] = self.texels[(y * self.width + x) as usize].map(f32::from);
+        Vec4::new(r, g, b, a) / UNORM16
+    }
+
+    /// The next mip level: a box filter over 2 × 2 texels (odd sides repeat the
+    /// last texel); `None` below 1 × 1.
+    fn halved(&self) -> Option<Level> {
+        if self.width == 1 && self.height == 1 {
+            return None;
+        }
+        let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
+        let mut texels = Vec::with_capacity((width * height) as usize);
+        for y in 0..height {
+            for x in 0..width {
+                let mut sum = [0_u32; 4];
+                for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                    let x = (2 * x + dx).min(self.width - 1);
+                    let y = (2 * y + dy).min(self.height - 1);
+                    let texel = self.texels[(y * self.width + x) as usize];
+                    for (s, t) in sum.iter_mut().zip(texel) {
+                        *s += u32::from(t);
+                    }
+                }
+                texels.push(sum.map(|s| ((s + 2) / 4) as u16));
+            }
+        }
+        Some(Level { width, height, texels })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn checker() -> Texture {
+        Texture::from_fn(4, 4, |x, y| {
+            if (x + y) % 2 == 0 { Vec4::ONE } else { Vec4::new(0.0, 0.0, 0.0, 1.0) }
+        })
+    }
+
+    #[test]
+    fn texel_centres_are_exact_and_midpoints_are_means() {
+        let texture = checker();
+        let at = |x: f32, y: f32| texture.sample(Vec2::new(x, y) / 4.0, Vec2::ZERO, Vec2::ZERO).x;
+        assert_eq!(at(0.5, 0.5), 1.0);
+        assert_eq!(at(1.5, 0.5), 0.0);
+        assert!((at(1.0, 0.5) - 0.5).abs() < 1e-6);
+        // Beyond the edge the texture repeats.
+        assert_eq!(at(4.5, 0.5), 1.0);
+        assert_eq!(at(-0.5, 0.5), 0.0);
+        assert!((at(0.0, 0.5) - 0.5).abs() < 1e-6);
+    }
+
+    #[test]
+    fn far_away_it_is_its_mean() {
+        let far = checker().sample(Vec2::new(0.3, 0.7), Vec2::X, Vec2::Y);
+        assert!((far - Vec4::new(0.5, 0.5, 0.5, 1.0)).abs().max_element() < 1e-4, "{far}");
+    }
+
+    #[test]
+    fn transparent_texels_do_not_bleed() {
+        // White and opaque beside black and transparent: half way the colour is
+        // still white.
+        let texture = Texture::from_fn(2, 1, |x, _| if x == 0 { Vec4::ONE } else { Vec4::ZERO });
+        let half = texture.sample(Vec2::new(0.5, 0.5), Vec2::ZERO, Vec2::ZERO);
+        assert!((half - Vec4::new(1.0, 1.0, 1.0, 0.5)).abs().max_element() < 1e-4, "{half}");
+        assert!(texture.has_alpha());
+    }
+
+    #[test]
+    fn mirror_and_clamp() {
+        assert_eq!(taps(-0.125, 4, Wrap::Clamp).0, 0);
+        assert_eq!(taps(1.2, 4, Wrap::Clamp).1, 3);
+        assert_eq!(taps(1.125, 4, Wrap::Mirror).0, 3);
+        assert_eq!(taps(-0.125, 4, Wrap::Mirror).0, 0);
+    }
+
+    #[test]
+    fn a_broken_file_is_one_error() {
+        let error = Texture::decode(b"\x89PNG\r\n\x1a\nrubbish", "a.png").unwrap_err().to_string();
+        assert!(error.starts_with("a.png: the texture cannot be decoded"), "{error}");
+    }
+}
