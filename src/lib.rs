@@ -2,6 +2,7 @@
 #![warn(missing_docs)]
 
 pub mod capture;
+pub mod cli;
 pub mod design;
 pub mod error;
 pub mod metrics;

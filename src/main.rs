@@ -1,1 +1,7 @@
-fn main() {}
+//! The command line of screendoor.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    screendoor::cli::main()
+}

@@ -132,7 +132,7 @@ fn strand_triangle(
         }
     };
     let (low, high) = (point, point + 1);
-    if local % 2 == 0 {
+    if local.is_multiple_of(2) {
         [vertex(low, -1.0), vertex(low, 1.0), vertex(high, 1.0)]
     } else {
         [vertex(low, -1.0), vertex(high, 1.0), vertex(high, -1.0)]
@@ -171,7 +171,7 @@ fn particle_triangle(
             colour: particles.colours.get(i).copied().unwrap_or(Vec4::ONE),
         }
     };
-    if local % 2 == 0 {
+    if local.is_multiple_of(2) {
         [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0)]
     } else {
         [corner(-1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)]

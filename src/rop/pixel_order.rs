@@ -35,7 +35,7 @@ fn hilbert(mut x: u32, mut y: u32, bits: u32) -> u32 {
         let (right, down) = (x >> bit & 1, y >> bit & 1);
         // The quadrants in the curve's order: 0 (left, up), 1 (left, down),
         // 2 (right, down), 3 (right, up).
-        distance = distance << 2 | (3 * right ^ down);
+        distance = distance << 2 | ((3 * right) ^ down);
         // The first and the last quadrant hold the curve mirrored.
         if down == 0 {
             if right == 1 {

@@ -205,6 +205,24 @@ impl Scene {
         self.shapes.push(shape);
     }
 
+    /// Puts the texture in the file at `path` on every material that has none;
+    /// where it has an alpha, those materials show it.
+    ///
+    /// # Errors
+    /// As [`Texture::read`].
+    pub fn apply_texture(&mut self, path: &Path) -> Result<()> {
+        let texture = Texture::read(path)?;
+        let has_alpha = texture.has_alpha();
+        self.textures.push(texture);
+        for material in self.materials.iter_mut().filter(|m| m.base_texture.is_none()) {
+            material.base_texture = Some(TextureUse::plain(self.textures.len() - 1));
+            if has_alpha && material.alpha_mode == AlphaMode::Opaque {
+                material.alpha_mode = AlphaMode::Blend;
+            }
+        }
+        Ok(())
+    }
+
     /// Checks that the scene can be drawn: indices in range, numbers finite,
     /// something there at all.
     fn check(&mut self) -> Result<()> {

@@ -41,7 +41,10 @@ pub struct Batch {
 /// Applies `$f` to the typed column inside a coverage or channel column.
 macro_rules! typed {
     ($column:expr, $enum:ident :: { $($variant:ident),+ }, $v:ident => $f:expr) => {
-        match $column { $($enum::$variant($v) => $f),+ }
+        match $column {
+            // A conversion to the widest type is useless for one of the variants.
+            $(#[allow(clippy::useless_conversion)] $enum::$variant($v) => $f),+
+        }
     };
 }
 
@@ -128,7 +131,7 @@ impl Batch {
     #[inline]
     pub fn coverage(&self, i: usize) -> SampleMask {
         SampleMask(
-            typed!(&self.coverage, CoverageColumn::{U8, U16, U32, U64}, c => c.get(i).into()),
+            typed!(&self.coverage, CoverageColumn::{U8, U16, U32, U64}, c => u64::from(c.get(i))),
         )
     }
 

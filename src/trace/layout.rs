@@ -280,10 +280,7 @@ impl BatchLayout {
                     format_args!("a batch holds at most {MAX_BATCH_ROWS}: write smaller ones"),
                 )
             })?;
-        let compression = match batch.compression() {
-            None => None,
-            Some(c) => Some(c.codec()),
-        };
+        let compression = batch.compression().map(|c| c.codec());
         let nodes: Vec<_> = batch.nodes().iter().flatten().collect();
         let buffers: Vec<_> = batch.buffers().iter().flatten().collect();
         if nodes.len() != columns.len() || buffers.len() != 2 * columns.len() {

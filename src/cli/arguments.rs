@@ -1,0 +1,81 @@
+//! Arguments that several commands share, and how they are read.
+
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+
+use crate::design::{Configured, configure};
+use crate::error::Result;
+use crate::param::{Options, parse_setting};
+use crate::trace::SamplePattern;
+
+/// A parser for an enumeration of [`Options`]: the names and helps are its own.
+pub(super) fn option<C: Options + Send + Sync>() -> impl TypedValueParser<Value = C> {
+    let values = C::CHOICES.iter().map(|c| PossibleValue::new(c.name).help(c.help));
+    PossibleValuesParser::new(values).map(|name| {
+        let index = C::CHOICES.iter().position(|c| c.name == name);
+        C::ALL[index.expect("the parser lets only the names pass")]
+    })
+}
+
+/// Reads `WIDTHxHEIGHT`.
+pub(super) fn size(text: &str) -> Result<(u32, u32), String> {
+    let bad = || format!("'{text}' is no size; write it as 800x600, each side 1 to 65536");
+    let (width, height) = text.split_once(['x', 'X']).ok_or_else(bad)?;
+    let side = |text: &str| {
+        text.parse().ok().filter(|s| (1..=crate::trace::MAX_SIDE).contains(s)).ok_or_else(bad)
+    };
+    Ok((side(width)?, side(height)?))
+}
+
+/// Reads a sample count.
+pub(super) fn samples(text: &str) -> Result<u32, String> {
+    let count = text.parse().ok().filter(|n| SamplePattern::is_count(*n));
+    count.ok_or_else(|| format!("'{text}' is no sample count; it is 1, 2, 4, 8, 16, 32 or 64"))
+}
+
+/// Reads `N` numbers separated by commas.
+pub(super) fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    let numbers: Option<Vec<f64>> =
+        text.split(',').map(|t| t.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
+    numbers
+        .and_then(|n| n.try_into().ok())
+        .ok_or_else(|| format!("'{text}' is not {N} numbers separated by commas"))
+}
+
+fn setting(text: &str) -> Result<(String, String), String> {
+    parse_setting(text).map_err(|e| e.to_string())
+}
+
+/// Which design, with which parameters.
+#[derive(Debug, Args)]
+pub(super) struct DesignArguments {
+    /// The design: NAME, or NAME:parameter=value,… ('screendoor designs' lists them)
+    #[arg(long, short, default_value = "lk", value_name = "DESIGN")]
+    design: String,
+    /// Sets one of the design's parameters; can be given several times
+    #[arg(long, value_name = "NAME=VALUE", value_parser = setting)]
+    set: Vec<(String, String)>,
+}
+
+impl DesignArguments {
+    pub fn configure(&self) -> Result<Configured> {
+        configure(&self.design, &self.set)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_and_numbers() {
+        assert_eq!(size("800x600"), Ok((800, 600)));
+        for bad in ["", "800", "0x5", "70000x1", "axb", "-1x5", "1e3x5"] {
+            assert!(size(bad).is_err(), "{bad}");
+        }
+        assert_eq!(numbers::<2>("30, -20.5"), Ok([30.0, -20.5]));
+        assert!(numbers::<2>("30").is_err() && numbers::<2>("nan,1").is_err());
+        assert_eq!(samples("64"), Ok(64));
+        assert!(samples("0").is_err() && samples("128").is_err());
+    }
+}

@@ -1,0 +1,67 @@
+//! `screendoor designs`.
+
+use clap::Args;
+
+use crate::cli::console::Console;
+use crate::design::DESIGNS;
+use crate::error::Result;
+use crate::param::{Kind, Param};
+use crate::rop::{Info, Promises};
+
+/// List the designs with their citations and parameters
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// Write the list as JSON to a file, or to standard output for -
+    #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
+    json: Option<String>,
+}
+
+#[derive(serde::Serialize)]
+struct Document {
+    #[serde(flatten)]
+    info: Info,
+    /// With default parameters.
+    promises: Promises,
+}
+
+pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
+    if let Some(path) = &arguments.json {
+        let document = |entry: &crate::design::Entry| -> Result<Document> {
+            Ok(Document { info: entry.info, promises: entry.configure(&[])?.promises() })
+        };
+        let documents = DESIGNS.iter().map(document).collect::<Result<Vec<_>>>()?;
+        return console.json(path, &documents);
+    }
+    for entry in DESIGNS {
+        let info = &entry.info;
+        console.print(format_args!("{}\n  {}\n  {}", info.name, info.summary, info.citation))?;
+        let p = entry.configure(&[])?.promises();
+        let list = [
+            (p.unbiased, "unbiased"),
+            (p.consistent, "consistent"),
+            (p.order_independent, "independent of order"),
+        ];
+        let held: Vec<&str> = list.iter().filter(|(holds, _)| *holds).map(|(_, n)| *n).collect();
+        if !held.is_empty() {
+            console.print(format_args!("  {}", held.join(", ")))?;
+        }
+        print_params(info.params, console)?;
+    }
+    Ok(())
+}
+
+/// Prints parameters with their values, defaults and helps.
+pub(super) fn print_params(params: &[Param], console: &Console) -> Result<()> {
+    for param in params {
+        console.print(format_args!("    {}={}  {}", param.name, param.default, param.help))?;
+        match param.kind {
+            Kind::Choice { options } => {
+                for option in options {
+                    console.print(format_args!("        {:<16} {}", option.name, option.help))?;
+                }
+            }
+            _ => console.print(format_args!("        {}", param.values()))?,
+        }
+    }
+    Ok(())
+}

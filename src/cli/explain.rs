@@ -1,0 +1,180 @@
+//! `screendoor explain`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::cli::arguments::{DesignArguments, numbers, samples};
+use crate::cli::console::Console;
+use crate::error::{Error, Result};
+use crate::param::Values;
+use crate::rop::{Contents, Explanation, Site, Step};
+use crate::trace::{SampleMask, Trace, Unorm32};
+
+/// Show what a design does at one pixel, fragment by fragment
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// The trace
+    trace: PathBuf,
+    /// The pixel: column and row from the top left
+    #[arg(long, value_name = "X,Y", value_parser = numbers::<2>)]
+    pixel: [f64; 2],
+    #[command(flatten)]
+    design: DesignArguments,
+    /// Samples per pixel; the trace's own count where not given
+    #[arg(long, value_name = "N", value_parser = samples)]
+    samples: Option<u32>,
+    /// The run's seed
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    seed: u32,
+    /// Show only the last N fragments
+    #[arg(long, value_name = "N")]
+    last: Option<usize>,
+    /// Write it as JSON to a file, or to standard output for -
+    #[arg(long, value_name = "FILE")]
+    json: Option<String>,
+}
+
+#[derive(serde::Serialize)]
+struct Document<'a> {
+    trace: &'a str,
+    design: &'a str,
+    parameters: &'a Values,
+    pixel: [u16; 2],
+    samples: u32,
+    seed: u32,
+    #[serde(flatten)]
+    explanation: &'a Explanation,
+}
+
+pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
+    let design = arguments.design.configure()?;
+    let trace = Trace::open(&arguments.trace)?;
+    let coordinate = |v: f64| {
+        let whole = v.fract() == 0.0 && (0.0..65536.0).contains(&v);
+        whole.then_some(v as u16).ok_or_else(|| {
+            Error::config(format_args!("{v} is no pixel coordinate"), "give whole numbers from 0")
+        })
+    };
+    let site = Site { x: coordinate(arguments.pixel[0])?, y: coordinate(arguments.pixel[1])? };
+    let samples = arguments.samples.unwrap_or(trace.header().pattern.samples());
+    let progress = console.progress("searching", "fragments");
+    let report = |done, total| progress.set(done, total);
+    let mut explanation = design.explain(&trace, samples, arguments.seed, site, &report)?;
+    drop(progress);
+    let all = explanation.steps.len();
+    if let Some(last) = arguments.last {
+        explanation.steps.drain(..all.saturating_sub(last));
+    }
+    if let Some(path) = &arguments.json {
+        let document = Document {
+            trace: trace.place(),
+            design: design.info().name,
+            parameters: design.values(),
+            pixel: [site.x, site.y],
+            samples,
+            seed: arguments.seed,
+            explanation: &explanation,
+        };
+        return console.json(path, &document);
+    }
+    console.print(format_args!(
+        "{} at pixel {},{} of {}: {samples} samples, seed {}",
+        design.label(),
+        site.x,
+        site.y,
+        trace.place(),
+        arguments.seed
+    ))?;
+    if all == 0 {
+        console.print(format_args!("no fragment of the trace covers this pixel"))?;
+    }
+    if explanation.steps.len() < all {
+        console.print(format_args!("… {} fragments before", all - explanation.steps.len()))?;
+    }
+    let mut before = explanation.cleared.clone();
+    for (i, step) in explanation.steps.iter().enumerate() {
+        let number = all - explanation.steps.len() + i + 1;
+        print_step(number, all, step, &before, console)?;
+        before = step.contents.clone();
+    }
+    let [r, g, b] = explanation.colour;
+    console.print(format_args!("resolved: {r:.5} {g:.5} {b:.5}"))
+}
+
+fn list(mask: SampleMask) -> String {
+    let samples: Vec<String> = mask.iter().map(|s| s.to_string()).collect();
+    if samples.is_empty() { "none".to_string() } else { samples.join(" ") }
+}
+
+/// A depth as a share of the depth range.
+fn depth(z: Unorm32) -> String {
+    if z == Unorm32::FAR {
+        return "far".to_string();
+    }
+    format!("{:.6}", f64::from(z.0) / f64::from(u32::MAX))
+}
+
+fn print_step(
+    number: usize,
+    all: usize,
+    step: &Step,
+    before: &Contents,
+    console: &Console,
+) -> Result<()> {
+    let line = |name: &str, value: String| console.print(format_args!("  {name:<10} {value}"));
+    let f = &step.fragment;
+    let [r, g, b] = f.colour;
+    console.print(format_args!(
+        "\nfragment {number} of {all}, row {}: primitive {}, object {}",
+        step.row, f.primitive, f.object
+    ))?;
+    line("fragment", format!("alpha {}, colour {r:.4} {g:.4} {b:.4}", f.alpha))?;
+    line("depth", format!("{} at the centre", depth(f.depth.z)))?;
+    line("covers", list(f.coverage))?;
+    let record = &step.record;
+    if let Some(passed) = record.passed {
+        line("nearer", format!("{} pass the depth test", list(passed)))?;
+    }
+    if let Some(surface) = record.surface {
+        line("surface", format!("starts surface {surface}"))?;
+    }
+    if let Some(order) = &record.order {
+        let order: Vec<String> = order.iter().map(u8::to_string).collect();
+        line("sorted", order.join(" "))?;
+    }
+    if !record.references.is_empty() {
+        let tests = record.references.iter().map(|t| {
+            let sign = if t.passed { "<" } else { ">" };
+            format!("{}:#{}:{:.4}{sign}", t.sample, t.number, t.value)
+        });
+        let tests: Vec<String> = tests.collect();
+        for (i, few) in tests.chunks(6).enumerate() {
+            let name = if i == 0 { "references" } else { "" };
+            line(name, few.join("  "))?;
+        }
+    }
+    line("writes", list(record.written))?;
+    let after = &step.contents;
+    if !after.samples.is_empty() {
+        let shown: Vec<String> = after
+            .samples
+            .iter()
+            .enumerate()
+            .map(|(s, sample)| {
+                let changed = before.samples.get(s) != Some(sample);
+                let [r, g, b] = sample.colour;
+                let mark = if changed { "*" } else { " " };
+                format!("{mark}{s:>2} {} ({r:.3} {g:.3} {b:.3})", depth(sample.depth))
+            })
+            .collect();
+        for (i, few) in shown.chunks(3).enumerate() {
+            let name = if i == 0 { "samples" } else { "" };
+            line(name, few.join("  "))?;
+        }
+    }
+    for (name, value) in &after.fields {
+        line(name, value.clone())?;
+    }
+    Ok(())
+}

@@ -1,0 +1,146 @@
+//! `screendoor info`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::cli::console::{Console, grouped};
+use crate::error::Result;
+use crate::trace::{Header, Statistics, Trace, statistics};
+
+/// Show what a user wants to know first about a trace
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// The trace
+    trace: PathBuf,
+    /// Write the figures as JSON to a file, or to standard output for -
+    #[arg(long, value_name = "FILE")]
+    json: Option<String>,
+}
+
+#[derive(serde::Serialize)]
+struct Document<'a> {
+    trace: String,
+    header: &'a Header,
+    content: Option<&'a str>,
+    row_bytes: usize,
+    batches: usize,
+    statistics: &'a Statistics,
+}
+
+pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
+    let trace = Trace::open(&arguments.trace)?;
+    if !trace.is_sealed() {
+        console.warn(&format!("{}: written without checksums by another program", trace.place()));
+    }
+    let progress = console.progress("counting", "fragments");
+    let mut done = 0;
+    let stats = statistics(&trace, |rows| {
+        done += rows;
+        progress.set(done, trace.rows());
+    })?;
+    drop(progress);
+    match &arguments.json {
+        Some(path) => console.json(
+            path,
+            &Document {
+                trace: trace.place().to_string(),
+                header: trace.header(),
+                content: trace.content(),
+                row_bytes: trace.header().row_bytes(),
+                batches: trace.batch_count(),
+                statistics: &stats,
+            },
+        ),
+        None => print(&trace, &stats, console),
+    }
+}
+
+fn print(trace: &Trace, stats: &Statistics, console: &Console) -> Result<()> {
+    let line = |name: &str, value: String| console.print(format_args!("{name:<18}{value}"));
+    let header = trace.header();
+    let share = |part: u64, whole: u64| {
+        if whole == 0 { 0.0 } else { 100.0 * part as f64 / whole as f64 }
+    };
+    console.print(format_args!("{}", trace.place()))?;
+    line("source", header.source.clone())?;
+    line("camera", header.camera.clone())?;
+    line("frame", format!("{} x {} pixels", header.width, header.height))?;
+    let nested = if header.pattern.nested { ", serves every smaller count" } else { "" };
+    line("samples", format!("{} ({}{nested})", header.pattern.samples(), header.pattern.name))?;
+    let [r, g, b] = header.background;
+    line("background", format!("{r} {g} {b}"))?;
+    line("fragments", format!("{} of {} bytes", grouped(stats.fragments), header.row_bytes()))?;
+    for (column, value) in &header.constants {
+        line("  constant", format!("{} = {value}", column.name()))?;
+    }
+    if let Some(content) = trace.content() {
+        line("content", content.to_string())?;
+    }
+    let pixels = u64::from(header.width) * u64::from(header.height);
+    line(
+        "covered pixels",
+        format!("{} ({:.1} %)", grouped(stats.covered_pixels), share(stats.covered_pixels, pixels)),
+    )?;
+    line(
+        "  without an edge",
+        format!(
+            "{} ({:.1} % of them)",
+            grouped(stats.interior_pixels),
+            share(stats.interior_pixels, stats.covered_pixels)
+        ),
+    )?;
+    line(
+        "whole fragments",
+        format!(
+            "{} ({:.1} %)",
+            grouped(stats.whole_fragments),
+            share(stats.whole_fragments, stats.fragments)
+        ),
+    )?;
+    let depth = &stats.depth_complexity;
+    line(
+        "depth complexity",
+        format!(
+            "mean {:.2}, median {}, 95th percentile {}, max {} fragments per covered pixel",
+            depth.mean, depth.median, depth.p95, depth.max
+        ),
+    )?;
+    line("layers", format!("{:.2} per sample of the covered pixels", stats.layers))?;
+    for (i, n) in depth.histogram.iter().enumerate() {
+        let low = if i == 0 { 1 } else { (1_u64 << (i - 1)) + 1 };
+        let range = if low >= 1 << i { format!("{low}") } else { format!("{low}-{}", 1_u64 << i) };
+        line(&format!("  {range}"), bar(*n, stats.covered_pixels, "pixels"))?;
+    }
+    line(
+        "alpha",
+        format!(
+            "min {}, mean {:.4}, max {}; {} exactly 0, {} exactly 1",
+            stats.alpha.min,
+            stats.alpha.mean,
+            stats.alpha.max,
+            grouped(stats.alpha.zero),
+            grouped(stats.alpha.opaque)
+        ),
+    )?;
+    for (i, n) in stats.alpha.histogram.iter().enumerate() {
+        let range = format!("  {:.1}-{:.1}", i as f64 / 10.0, (i + 1) as f64 / 10.0);
+        line(&range, bar(*n, stats.fragments, "fragments"))?;
+    }
+    if let Some([near, far]) = stats.depth {
+        line("depth", format!("{near:.6} to {far:.6} of the range"))?;
+    }
+    line("primitives", format!("numbered up to {}", grouped(stats.primitives)))?;
+    let more = if stats.objects.more { "more than " } else { "" };
+    line("objects", format!("{more}{}", grouped(stats.objects.count as u64)))?;
+    for (object, n) in &stats.objects.largest {
+        line(&format!("  {object}"), bar(*n, stats.fragments, "fragments"))?;
+    }
+    Ok(())
+}
+
+/// A bar of up to 30 characters with its figure.
+fn bar(n: u64, whole: u64, unit: &str) -> String {
+    let length = if whole == 0 { 0 } else { (30 * n).div_ceil(whole) as usize };
+    format!("{:<31}{} {unit}", "#".repeat(length), grouped(n))
+}

@@ -1,0 +1,87 @@
+//! The command line: one file a subcommand, each of which only calls.
+
+mod arguments;
+mod capture;
+mod compare;
+mod console;
+mod demo;
+mod designs;
+mod explain;
+mod info;
+mod replay;
+mod scenes;
+mod verify;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+use crate::cli::console::Console;
+use crate::error::{Error, Result};
+
+/// Replay captured fragment traces through models of a raster-operations unit
+/// for order-independent transparency, and see what each costs and how far its
+/// picture is from the exact one.
+#[derive(Debug, Parser)]
+#[command(name = "screendoor", version, propagate_version = true, subcommand_required = true)]
+struct Arguments {
+    /// Threads to use; all processors where not given
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// No progress bars and no warnings
+    #[arg(long, short, global = true)]
+    quiet: bool,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Demo(demo::Arguments),
+    Capture(Box<capture::Arguments>),
+    Info(info::Arguments),
+    Replay(replay::Arguments),
+    Compare(compare::Arguments),
+    Explain(explain::Arguments),
+    Designs(designs::Arguments),
+    Scenes(scenes::Arguments),
+    Verify(verify::Arguments),
+}
+
+/// Parses the process's arguments and runs the command.
+///
+/// Exit codes: 0 for success; 1 where a file is missing, damaged or cannot be
+/// written; 2 where the request itself cannot be.
+pub fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let console = Console::new(arguments.quiet);
+    match run(&arguments, &console) {
+        Ok(()) => ExitCode::SUCCESS,
+        // The reader of our output has seen enough.
+        Err(Error::Io { source, .. }) if source.kind() == std::io::ErrorKind::BrokenPipe => {
+            ExitCode::SUCCESS
+        }
+        Err(error) => {
+            eprintln!("screendoor: error: {error}");
+            ExitCode::from(if error.is_config() { 2 } else { 1 })
+        }
+    }
+}
+
+fn run(arguments: &Arguments, console: &Console) -> Result<()> {
+    if let Some(threads) = arguments.threads {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global();
+        pool.map_err(|e| Error::config(e, "ask for fewer threads"))?;
+    }
+    match &arguments.command {
+        Command::Demo(a) => demo::run(a, console),
+        Command::Capture(a) => capture::run(a, console),
+        Command::Info(a) => info::run(a, console),
+        Command::Replay(a) => replay::run(a, console),
+        Command::Compare(a) => compare::run(a, console),
+        Command::Explain(a) => explain::run(a, console),
+        Command::Designs(a) => designs::run(a, console),
+        Command::Scenes(a) => scenes::run(a, console),
+        Command::Verify(a) => verify::run(a, console),
+    }
+}

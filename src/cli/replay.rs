@@ -1,0 +1,278 @@
+//! `screendoor replay`.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::Args;
+use serde::Serialize;
+
+use crate::cli::arguments::{DesignArguments, samples};
+use crate::cli::console::{Console, grouped};
+use crate::design::{Configured, REFERENCE, configure};
+use crate::error::{Error, Result};
+use crate::metrics::{Ensemble, EnsembleErrors, PixelClasses, Region};
+use crate::param::Values;
+use crate::picture::{Layer, Picture, write_exr, write_png};
+use crate::rop::{EventCounts, Promises, ReplayOptions, Replayed, StateBits};
+use crate::trace::Trace;
+
+/// Replay a trace through a design: a picture, its error, what the ROP did
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// The trace
+    trace: PathBuf,
+    #[command(flatten)]
+    design: DesignArguments,
+    /// Samples per pixel; the trace's own count where not given
+    #[arg(long, value_name = "N", value_parser = samples)]
+    samples: Option<u32>,
+    /// The run's seed: one seed names one picture
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    seed: u32,
+    /// Replay this many seeds, from --seed on, and tell variance from bias;
+    /// implies --exact
+    #[arg(long, default_value_t = 1, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    seeds: u32,
+    /// Composite the exact picture too and give the error against it
+    #[arg(long)]
+    exact: bool,
+    /// A picture to write, .exr or .png; can be given several times
+    #[arg(long, short, value_name = "FILE")]
+    output: Vec<PathBuf>,
+    /// Write the results as JSON to a file, or to standard output for -
+    #[arg(long, value_name = "FILE")]
+    json: Option<String>,
+    /// MiB that the exact answer's fragments may take at a time
+    #[arg(long, default_value_t = 512, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1 << 20))]
+    memory: u64,
+    /// Fragments that are binned at a time
+    #[arg(long, default_value_t = 1 << 19, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1 << 30))]
+    window: u64,
+}
+
+/// The result of one replay command.
+#[derive(Serialize)]
+struct Document<'a> {
+    trace: &'a str,
+    content: Option<&'a str>,
+    design: &'a str,
+    parameters: &'a Values,
+    promises: Promises,
+    samples: u32,
+    seed: u32,
+    /// Of the first seed's picture: equal hashes are equal pictures.
+    picture: String,
+    seconds: f64,
+    fragments_per_second: f64,
+    passes: u32,
+    state_bits: StateBits,
+    touched_tiles: usize,
+    events: &'a EventCounts,
+    errors: Option<ErrorsByRegion>,
+}
+
+/// Errors against the exact picture, in 8-bit units.
+#[derive(Serialize)]
+struct ErrorsByRegion {
+    frame: EnsembleErrors,
+    covered: EnsembleErrors,
+}
+
+pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
+    let design = arguments.design.configure()?;
+    for path in &arguments.output {
+        check_ending(path)?;
+    }
+    let trace = Trace::open(&arguments.trace)?;
+    if !trace.is_sealed() {
+        console.warn(&format!("{}: written without checksums by another program", trace.place()));
+    }
+    let samples = arguments.samples.unwrap_or(trace.header().pattern.samples());
+    let progress = console.progress("replaying", "fragments");
+    let report = |done, total| progress.set(done, total);
+    let options = ReplayOptions {
+        count_events: true,
+        window: arguments.window as usize,
+        memory: arguments.memory << 20,
+        progress: &report,
+    };
+    // Wrong requests first, before anything takes long.
+    trace.header().pattern.prefix(samples)?;
+
+    let start = Instant::now();
+    let first = design.replay(&trace, samples, arguments.seed, &options)?;
+    let seconds = start.elapsed().as_secs_f64();
+
+    let reference = if arguments.exact || arguments.seeds > 1 {
+        progress.name("compositing");
+        Some(configure(REFERENCE, &[])?.replay(&trace, samples, 0, &options)?.picture)
+    } else {
+        None
+    };
+    let errors = match &reference {
+        None => None,
+        Some(reference) => {
+            let pictures = (1..arguments.seeds).map(|i| {
+                progress.name(&format!("seed {} of {}", i + 1, arguments.seeds));
+                let seed = arguments.seed.wrapping_add(i);
+                let plain = ReplayOptions { count_events: false, ..options };
+                Ok(design.replay(&trace, samples, seed, &plain)?.picture)
+            });
+            Some(by_region(&trace, samples, reference, &first.picture, pictures)?)
+        }
+    };
+    drop(progress);
+
+    for path in &arguments.output {
+        write(path, &first.picture, reference.as_ref())?;
+    }
+    let events = first.events.clone().unwrap_or_default();
+    let fragments_per_second = events.fragments as f64 / seconds;
+    if let Some(path) = &arguments.json {
+        let document = Document {
+            trace: trace.place(),
+            content: trace.content(),
+            design: design.info().name,
+            parameters: design.values(),
+            promises: design.promises(),
+            samples,
+            seed: arguments.seed,
+            picture: first.picture.hash(),
+            seconds,
+            fragments_per_second,
+            passes: first.passes,
+            state_bits: first.state_bits,
+            touched_tiles: first.touched_tiles,
+            events: &events,
+            errors,
+        };
+        return console.json(path, &document);
+    }
+    console.print(format_args!(
+        "{} at {samples} samples, seed {}: {}",
+        design.label(),
+        arguments.seed,
+        trace.place()
+    ))?;
+    console.print(format_args!(
+        "{} fragments in {seconds:.2} s ({:.2} million a second)",
+        grouped(events.fragments),
+        fragments_per_second / 1e6
+    ))?;
+    if let Some(errors) = &errors {
+        print_errors(errors, console)?;
+    }
+    print_events(&first, &events, &design, console)
+}
+
+fn check_ending(path: &Path) -> Result<()> {
+    match path.extension().and_then(|e| e.to_str()) {
+        Some("exr" | "png") => Ok(()),
+        _ => Err(Error::config(
+            format_args!("cannot write a picture as '{}'", path.display()),
+            "name a .exr or .png file",
+        )),
+    }
+}
+
+/// PNG shows the picture; EXR holds it in layers with the reference and the error.
+fn write(path: &Path, picture: &Picture, reference: Option<&Picture>) -> Result<()> {
+    if path.extension().is_some_and(|e| e == "png") {
+        return write_png(path, picture);
+    }
+    let error = reference.map(|r| picture.zip(r, |a, b| std::array::from_fn(|i| a[i] - b[i])));
+    let mut layers = vec![Layer { name: "colour", picture }];
+    if let (Some(reference), Some(error)) = (reference, &error) {
+        layers.push(Layer { name: "reference", picture: reference });
+        layers.push(Layer { name: "error", picture: error });
+    }
+    write_exr(path, &layers)
+}
+
+fn by_region(
+    trace: &Trace,
+    samples: u32,
+    reference: &Picture,
+    first: &Picture,
+    others: impl Iterator<Item = Result<Picture>>,
+) -> Result<ErrorsByRegion> {
+    let whole = Region::frame(reference.grid());
+    let covered = PixelClasses::of(trace, samples)?.covered;
+    let mut frame = Ensemble::new(reference, &whole);
+    let mut inside = Ensemble::new(reference, &covered);
+    frame.add(first);
+    inside.add(first);
+    for picture in others {
+        let picture = picture?;
+        frame.add(&picture);
+        inside.add(&picture);
+    }
+    Ok(ErrorsByRegion { frame: frame.finish(), covered: inside.finish() })
+}
+
+fn print_errors(errors: &ErrorsByRegion, console: &Console) -> Result<()> {
+    let seeds = errors.frame.seeds;
+    let of = if seeds > 1 { format!(" of {seeds} seeds, 95 % intervals") } else { String::new() };
+    console.print(format_args!("error against exact in 8-bit units{of}"))?;
+    for (name, e) in [("frame", &errors.frame), ("covered", &errors.covered)] {
+        let spread = |v: f64| if seeds > 1 { format!(" ± {v:.3}") } else { String::new() };
+        console.print(format_args!(
+            "  {name:<8} RMSE {:.3}{} linear, {:.3}{} sRGB; mean {:+.4}{}; max {:.1}",
+            e.rmse.value,
+            spread(e.rmse.half_width()),
+            e.rmse_srgb.value,
+            spread(e.rmse_srgb.half_width()),
+            e.mean.value,
+            spread(e.mean.half_width()),
+            e.max
+        ))?;
+        if let (Some(variance), Some(bias)) = (e.variance, e.bias_squared) {
+            console.print(format_args!(
+                "  {:<8} variance {variance:.3}, squared bias {bias:+.4}",
+                ""
+            ))?;
+        }
+    }
+    Ok(())
+}
+
+fn print_events(
+    replayed: &Replayed,
+    events: &EventCounts,
+    design: &Configured,
+    console: &Console,
+) -> Result<()> {
+    let per = |n: u64| n as f64 / events.fragments.max(1) as f64;
+    let line = |name: &str, n: u64| {
+        console.print(format_args!("  {name:<22}{:>18}{:>12.3}", grouped(n), per(n)))
+    };
+    console.print(format_args!("{:<24}{:>18}{:>12}", "events", "", "a fragment"))?;
+    line("samples tested", events.samples_tested)?;
+    line("samples passed", events.samples_passed)?;
+    line("samples written", events.samples_written)?;
+    line("hashes", events.hashes)?;
+    line("sorts", events.sorts())?;
+    for (length, n) in events.sorts_by_length.iter().enumerate().filter(|(_, n)| **n > 0) {
+        line(&format!("  of {length}"), *n)?;
+    }
+    line("surfaces started", events.surfaces)?;
+    let [read, written] = events.state_bytes();
+    line("state bytes read", read)?;
+    line("state bytes written", written)?;
+    let bits = replayed.state_bits;
+    let size = if bits.unbounded {
+        "grows with the fragments".to_string()
+    } else {
+        format!("{} bits: {} of samples, {} beside", bits.total(), bits.samples, bits.extra)
+    };
+    console.print(format_args!("state per pixel         {size}"))?;
+    console.print(format_args!("passes over the trace   {}", replayed.passes))?;
+    let promises = design.promises();
+    let word = |holds: bool| if holds { "yes" } else { "no" };
+    console.print(format_args!(
+        "promises                unbiased {}, consistent {}, independent of order {}",
+        word(promises.unbiased),
+        word(promises.consistent),
+        word(promises.order_independent)
+    ))
+}
