@@ -12,5 +12,6 @@ pub mod picture;
 pub mod random;
 pub mod rop;
 pub mod scene;
+pub mod study;
 pub mod tile;
 pub mod trace;

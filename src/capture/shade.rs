@@ -86,11 +86,13 @@ impl<'a> Shader<'a> {
             a * w[0] as f32 + b * w[1] as f32 + c * w[2] as f32
         };
         let mut base = material.base * mix(&weights.at, a.colour, b.colour, c.colour);
-        let uv = |w: &[f64; 3]| a.uv * w[0] as f32 + b.uv * w[1] as f32 + c.uv * w[2] as f32;
+        // The weights' changes add up to 0.
+        let turned = |w: &[f64; 3]| (b.uv - a.uv) * w[1] as f32 + (c.uv - a.uv) * w[2] as f32;
+        let uv = a.uv + turned(&weights.at);
         let texel = |t: TextureUse| {
             let turn = |v: Vec2| t.transform.matrix2 * v;
-            let at = t.transform.transform_point2(uv(&weights.at));
-            let (dx, dy) = (turn(uv(&weights.dx)), turn(uv(&weights.dy)));
+            let at = t.transform.transform_point2(uv);
+            let (dx, dy) = (turn(turned(&weights.dx)), turn(turned(&weights.dy)));
             self.scene.textures[t.texture].sample(at, dx, dy)
         };
         let base_texel = material.base_texture.map_or(Vec4::ONE, texel);

@@ -35,6 +35,9 @@ pub(super) struct Arguments {
     /// A PNG or JPEG for surfaces that have no texture
     #[arg(long, value_name = "FILE")]
     texture: Option<PathBuf>,
+    /// Make every surface white, keeping alphas
+    #[arg(long)]
+    white: bool,
     /// The order in which triangles are drawn
     #[arg(long, default_value = "api", value_parser = option::<Order>())]
     order: Order,
@@ -68,6 +71,9 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let mut scene = scene::load(&arguments.scene)?;
     if let Some(texture) = &arguments.texture {
         scene.apply_texture(texture)?;
+    }
+    if arguments.white {
+        scene.whiten();
     }
     for warning in &scene.warnings {
         console.warn(warning);

@@ -198,16 +198,13 @@ fn by_region(
 ) -> Result<ErrorsByRegion> {
     let whole = Region::frame(reference.grid());
     let covered = PixelClasses::of(trace, samples)?.covered;
-    let mut frame = Ensemble::new(reference, &whole);
-    let mut inside = Ensemble::new(reference, &covered);
-    frame.add(first);
-    inside.add(first);
+    let mut ensemble = Ensemble::new(reference, &[&whole, &covered]);
+    ensemble.add(first);
     for picture in others {
-        let picture = picture?;
-        frame.add(&picture);
-        inside.add(&picture);
+        ensemble.add(&picture?);
     }
-    Ok(ErrorsByRegion { frame: frame.finish(), covered: inside.finish() })
+    let [frame, covered] = ensemble.finish().try_into().expect("one a region");
+    Ok(ErrorsByRegion { frame, covered })
 }
 
 fn print_errors(errors: &ErrorsByRegion, console: &Console) -> Result<()> {

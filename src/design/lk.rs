@@ -9,7 +9,7 @@ use crate::param::{Param, Values};
 use crate::rop::{
     Blueprint, Contents, Design, Family, Frame, Info, PixelIndex, PixelOrder, Probe, Promises,
     Reference, ReferenceKey, SampleList, Samples, Site, StateBits, SurfaceRule, SurfaceTracker,
-    Threshold, depth_bits, in_sample_order, sample_depths, sort_by_stored_depth,
+    Threshold, Tracked, depth_bits, in_sample_order, sample_depths, sort_by_stored_depth,
 };
 use crate::trace::{Fragment, SampleMask, Unorm32};
 
@@ -38,6 +38,11 @@ impl Blueprint for LaineKarras {
                 "bitmask",
                 "when a fragment starts a new surface",
             ),
+            Param::choice::<Tracked>(
+                "track",
+                "survivors",
+                "which samples the surface tracking sees",
+            ),
             Param::choice::<PixelOrder>(
                 "pixel-order",
                 "hilbert",
@@ -56,6 +61,7 @@ impl Blueprint for LaineKarras {
             sort: values.flag("sort"),
             compact: values.flag("compact"),
             surfaces: values.choice("surfaces"),
+            track: values.choice("track"),
             pixel_order: values.choice("pixel-order"),
             reference: values.choice("reference"),
             depth_bits: depth_bits::of(values),
@@ -63,10 +69,28 @@ impl Blueprint for LaineKarras {
     }
 
     fn promises(values: &Values) -> Promises {
+        let reference: Reference = values.choice("reference");
         // Without scrambling, a pixel's surfaces share their reference values.
-        let scrambled =
-            matches!(values.choice::<Reference>("reference"), Reference::Lk2011 | Reference::White);
-        Promises { unbiased: scrambled, consistent: scrambled, order_independent: false }
+        let scrambled = matches!(reference, Reference::Lk2011 | Reference::White);
+        // The publication takes its tracking to be unbiased; it is not quite. Whether
+        // a fragment that survives in part continues the current surface depends on
+        // which of that surface's samples it wrote: where they passed, they hide the
+        // conflict, the surface goes on, and the samples still to come are given the
+        // complementary reference values, which rather fail; where they did not pass,
+        // a new surface starts afresh. Any of these breaks the link; a primitive's
+        // fragments do not meet themselves.
+        let rule: SurfaceRule = values.choice("surfaces");
+        let chance_decides_surfaces = reference != Reference::White
+            && matches!(rule, SurfaceRule::Bitmask | SurfaceRule::Object)
+            && values.choice::<Tracked>("track") == Tracked::Survivors
+            && values.flag("compact");
+        Promises {
+            unbiased: scrambled && !chance_decides_surfaces,
+            // Unscrambled values still share out each stored surface evenly, as long as
+            // its samples are numbered in a row.
+            consistent: scrambled || (values.flag("compact") && values.flag("sort")),
+            order_independent: false,
+        }
     }
 }
 
@@ -77,6 +101,7 @@ pub struct LaineKarrasAt<const N: usize> {
     sort: bool,
     compact: bool,
     surfaces: SurfaceRule,
+    track: Tracked,
     pixel_order: PixelOrder,
     reference: Reference,
     depth_bits: u32,
@@ -97,7 +122,7 @@ impl<const N: usize> Design for LaineKarrasAt<N> {
     fn state_bits(&self) -> StateBits {
         StateBits {
             samples: N as u32 * (self.depth_bits + self.frame.colour_bits),
-            extra: SurfaceTracker::state_bits(self.surfaces, N as u32),
+            extra: SurfaceTracker::state_bits(self.surfaces, self.track, N as u32),
             unbounded: false,
         }
     }
@@ -130,12 +155,17 @@ impl<const N: usize> Design for LaineKarrasAt<N> {
         probe.passed(passed);
         probe.state(self.depth_bits * fragment.coverage.count(), 0);
         let s = if self.compact { passed } else { fragment.coverage };
-        if s.is_empty() {
+        // The figure tracks what is left of S; see `Tracked` for the alternative.
+        let tracked = match self.track {
+            Tracked::Survivors => s,
+            Tracked::Covered => fragment.coverage,
+        };
+        if tracked.is_empty() {
             return;
         }
 
         // 4–8: a new surface where one is needed, and the first sample's number.
-        let (mut n, starts) = p.surface.enter(self.surfaces, s, fragment);
+        let (mut n, starts) = p.surface.enter(self.surfaces, tracked, fragment);
         if starts {
             probe.surface(p.surface.surface_id);
         }
@@ -167,9 +197,9 @@ impl<const N: usize> Design for LaineKarrasAt<N> {
         }
 
         // 18: all that were numbered, written or not.
-        p.surface.hold(s);
+        p.surface.hold(tracked, s.count());
         probe.written(written);
-        let tracking = SurfaceTracker::state_bits(self.surfaces, N as u32);
+        let tracking = SurfaceTracker::state_bits(self.surfaces, self.track, N as u32);
         let sample_bits = self.depth_bits + self.frame.colour_bits;
         probe.state(tracking, tracking + sample_bits * written.count());
     }

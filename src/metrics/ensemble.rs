@@ -6,12 +6,14 @@ use crate::metrics::{Errors, Estimate, Region, UNIT, errors};
 use crate::picture::{Picture, TilePixels};
 use crate::tile::{TILE_PIXELS, TileMap};
 
-/// Gathers the pictures of independent seeds against one reference.
+/// Gathers the pictures of independent seeds against one reference, over one or
+/// more regions of the frame.
 #[derive(Debug)]
 pub struct Ensemble<'a> {
     reference: &'a Picture,
-    region: &'a Region,
-    runs: Vec<Errors>,
+    regions: Vec<&'a Region>,
+    /// One row a region, one entry a run.
+    runs: Vec<Vec<Errors>>,
     /// Sums over the runs of the error and of its square, at each pixel.
     sums: TileMap<(TilePixels, TilePixels)>,
     /// The same of the untouched pixels' common error.
@@ -44,11 +46,11 @@ pub struct EnsembleErrors {
 
 impl<'a> Ensemble<'a> {
     /// An ensemble without runs.
-    pub fn new(reference: &'a Picture, region: &'a Region) -> Self {
+    pub fn new(reference: &'a Picture, regions: &[&'a Region]) -> Self {
         Ensemble {
             reference,
-            region,
-            runs: Vec::new(),
+            regions: regions.to_vec(),
+            runs: vec![Vec::new(); regions.len()],
             sums: TileMap::new(reference.grid()),
             rest: ([0.0; 3], [0.0; 3]),
         }
@@ -59,7 +61,9 @@ impl<'a> Ensemble<'a> {
     /// # Panics
     /// Where its frame differs from the reference's.
     pub fn add(&mut self, picture: &Picture) {
-        self.runs.push(errors(picture, self.reference, self.region));
+        for (runs, region) in self.runs.iter_mut().zip(&self.regions) {
+            runs.push(errors(picture, self.reference, region));
+        }
         let add = |sum: &mut [f64; 3], square: &mut [f64; 3], a: [f64; 3], b: [f64; 3]| {
             for i in 0..3 {
                 let difference = a[i] - b[i];
@@ -90,69 +94,66 @@ impl<'a> Ensemble<'a> {
         add(&mut self.rest.0, &mut self.rest.1, picture.background(), self.reference.background());
     }
 
-    /// The error of each run.
-    pub fn runs(&self) -> &[Errors] {
-        &self.runs
-    }
-
-    /// The mean over the runs at each pixel, minus the reference, over the
-    /// standard error of that mean: the bias in units of what chance explains.
-    /// 0 where all runs agree with the reference, infinite where they agree with
-    /// each other and not with it.
-    pub fn z_scores(&self) -> Vec<f64> {
-        let n = self.runs.len() as f64;
-        let mut scores = Vec::new();
+    /// Calls `each` with the mean error and the variance over the runs of every
+    /// channel of every touched pixel of `region`.
+    fn for_each_channel(&self, region: &Region, mut each: impl FnMut(f64, f64)) {
+        let n = self.runs.first().map_or(0, Vec::len) as f64;
         for (tile, (sum, square)) in self.sums.touched() {
-            for within in (0..TILE_PIXELS).filter(|w| self.region.holds(*tile, *w)) {
+            for within in (0..TILE_PIXELS).filter(|w| region.holds(*tile, *w)) {
                 for (s, q) in sum[within].iter().zip(&square[within]) {
                     let mean = s / n;
-                    let variance = ((q - s * mean) / (n - 1.0)).max(0.0);
-                    // Rounding leaves crumbs where all runs are equal.
-                    let (mean, deviation) = if mean.abs() < 1e-6 && variance < 1e-12 {
-                        (0.0, 1.0)
-                    } else {
-                        (mean, (variance / n).sqrt())
-                    };
-                    scores.push(mean / deviation);
+                    each(mean, ((q - s * mean) / (n - 1.0)).max(0.0));
                 }
             }
         }
+    }
+
+    /// For every channel of every touched pixel of the region at place `region`:
+    /// the mean error over the runs, in units of its standard error. 0 where all
+    /// runs agree with the reference, infinite where they agree with each other
+    /// and not with it.
+    pub fn z_scores(&self, region: usize) -> Vec<f64> {
+        let n = self.runs[region].len() as f64;
+        let mut scores = Vec::new();
+        self.for_each_channel(self.regions[region], |mean, variance| {
+            // Rounding leaves crumbs where all runs are equal.
+            let exact = mean.abs() < 1e-6 && variance < 1e-12;
+            scores.push(if exact { 0.0 } else { mean / (variance / n).sqrt() });
+        });
         scores
     }
 
-    /// The errors over the runs so far.
-    pub fn finish(&self) -> EnsembleErrors {
-        let n = self.runs.len();
+    /// The errors over the runs so far, region by region.
+    pub fn finish(&self) -> Vec<EnsembleErrors> {
+        self.regions.iter().zip(&self.runs).map(|(region, runs)| self.over(region, runs)).collect()
+    }
+
+    fn over(&self, region: &Region, runs: &[Errors]) -> EnsembleErrors {
+        let n = runs.len() as f64;
         let squares = |f: fn(&Errors) -> f64| {
-            let runs: Vec<f64> = self.runs.iter().map(|r| f(r) * f(r)).collect();
-            Estimate::of(&runs).sqrt()
+            let squares: Vec<f64> = runs.iter().map(|r| f(r) * f(r)).collect();
+            Estimate::of(&squares).sqrt()
         };
-        let means: Vec<f64> = self.runs.iter().map(|r| r.mean).collect();
+        let means: Vec<f64> = runs.iter().map(|r| r.mean).collect();
         let (mut variance, mut bias_squared) = (0.0, 0.0);
-        if n > 1 {
-            let n = n as f64;
-            for (tile, (sum, square)) in self.sums.touched() {
-                for within in (0..TILE_PIXELS).filter(|w| self.region.holds(*tile, *w)) {
-                    for (s, q) in sum[within].iter().zip(&square[within]) {
-                        let mean = s / n;
-                        let v = ((q - s * mean) / (n - 1.0)).max(0.0);
-                        variance += v;
-                        // E[mean²] = bias² + v/n.
-                        bias_squared += mean * mean - v / n;
-                    }
-                }
-            }
+        if runs.len() > 1 {
+            self.for_each_channel(region, |mean, v| {
+                variance += v;
+                // E[mean²] = bias² + v/n.
+                bias_squared += mean * mean - v / n;
+            });
         }
-        let scale = 1.0 / ((3 * self.region.pixels()).max(1) as f64 * UNIT * UNIT);
+        let scale = 1.0 / ((3 * region.pixels()).max(1) as f64 * UNIT * UNIT);
+        let known = |v: f64| (runs.len() > 1).then_some(v * scale);
         EnsembleErrors {
-            seeds: n,
-            pixels: self.region.pixels(),
+            seeds: runs.len(),
+            pixels: region.pixels(),
             rmse: squares(|r| r.rmse),
             rmse_srgb: squares(|r| r.rmse_srgb),
             mean: Estimate::of(&means),
-            max: self.runs.iter().map(|r| r.max).fold(0.0, f64::max),
-            variance: (n > 1).then_some(variance * scale),
-            bias_squared: (n > 1).then_some(bias_squared * scale),
+            max: runs.iter().map(|r| r.max).fold(0.0, f64::max),
+            variance: known(variance),
+            bias_squared: known(bias_squared),
         }
     }
 }
@@ -168,7 +169,7 @@ mod tests {
         let grid = TileGrid::new(48, 48);
         let reference = Picture::from_fn(grid, |_, _| [0.5; 3]);
         let region = Region::frame(grid);
-        let mut ensemble = Ensemble::new(&reference, &region);
+        let mut ensemble = Ensemble::new(&reference, &[&region]);
         let unit = |words| f64::from(hash::<4>(words)) / 2_f64.powi(32);
         // Uniform noise of variance 0.2²/12 with a bias of 0.03.
         for seed in 0..40 {
@@ -176,7 +177,7 @@ mod tests {
                 std::array::from_fn(|c| 0.53 + 0.2 * (unit([seed, x, y, c as u32]) - 0.5))
             }));
         }
-        let e = ensemble.finish();
+        let e = &ensemble.finish()[0];
         let unit = 255.0 * 255.0;
         let (variance, bias) = (e.variance.unwrap() / unit, e.bias_squared.unwrap() / unit);
         assert!((variance - 0.04 / 12.0).abs() < 1e-4, "{variance}");
@@ -192,16 +193,32 @@ mod tests {
         let grid = TileGrid::new(16, 16);
         let reference = Picture::from_fn(grid, |_, _| [0.0; 3]);
         let region = Region::frame(grid);
-        let mut ensemble = Ensemble::new(&reference, &region);
+        let mut ensemble = Ensemble::new(&reference, &[&region]);
         for seed in 0..100_u32 {
             // ±1 in turn, but for one pixel that is always 1.
-            let sign = if seed % 2 == 0 { 1.0 } else { -1.0 };
+            let sign = if seed.is_multiple_of(2) { 1.0 } else { -1.0 };
             ensemble.add(&Picture::from_fn(grid, |x, y| {
                 if (x, y) == (5, 5) { [1.0; 3] } else { [sign; 3] }
             }));
         }
-        let scores = ensemble.z_scores();
+        let scores = ensemble.z_scores(0);
         assert_eq!(scores.iter().filter(|z| z.is_infinite()).count(), 3);
         assert_eq!(scores.iter().filter(|z| **z == 0.0).count(), 3 * 255);
+    }
+
+    #[test]
+    fn tiles_that_only_some_runs_touch_count_in_all() {
+        let grid = TileGrid::new(32, 16);
+        let reference = Picture::new(grid, [0.0; 3]);
+        let region = Region::frame(grid);
+        let mut ensemble = Ensemble::new(&reference, &[&region]);
+        let mut touched = Picture::new(grid, [1.0; 3]);
+        touched.tile_mut(grid.tile(0, 0)).fill([3.0; 3]);
+        ensemble.add(&Picture::new(grid, [1.0; 3]));
+        ensemble.add(&touched);
+        ensemble.add(&Picture::new(grid, [1.0; 3]));
+        let e = &ensemble.finish()[0];
+        // Half of the pixels have 1, 3, 1: variance 4/3; the others have none.
+        assert!((e.variance.unwrap() * UNIT * UNIT - 2.0 / 3.0).abs() < 1e-12);
     }
 }

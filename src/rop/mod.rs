@@ -20,4 +20,4 @@ pub use replay::{Explanation, ReplayOptions, Replayed, Step, draw_pixel, explain
 pub use samples::{
     SampleContents, SampleList, Samples, in_sample_order, sample_depths, sort_by_stored_depth,
 };
-pub use surface::{CoveredMask, SurfaceRule, SurfaceTracker};
+pub use surface::{CoveredMask, SurfaceRule, SurfaceTracker, Tracked};

@@ -15,6 +15,14 @@ crate::options! {
     }
 }
 
+crate::options! {
+    /// Which samples of a fragment the tracker sees.
+    pub enum Tracked {
+        Survivors = "survivors": "those that pass the depth test (LK figure 7): biased where surfaces share pixels",
+        Covered = "covered": "all that the fragment covers: unbiased, for a counter of the numbered samples",
+    }
+}
+
 /// One bit per sample of a pixel.
 pub type CoveredMask = BitArray<[u64; 1], Lsb0>;
 
@@ -25,14 +33,18 @@ pub struct SurfaceTracker {
     pub covered: CoveredMask,
     /// `p.surfaceId`.
     pub surface_id: u32,
+    /// How many samples of the current surface have been numbered. Where only
+    /// numbered samples are held this is the number of bits in `covered`, and no
+    /// state of its own.
+    numbered: u32,
     /// The primitive or object that drew last, where the rule asks; plus one.
     last: Option<u32>,
 }
 
 impl SurfaceTracker {
-    /// LK figure 7, lines 4 to 8: starts a new surface where the rule says so.
-    /// Returns the number of the surface's first sample in this fragment and
-    /// whether the surface is new.
+    /// LK figure 7, lines 4 to 8: starts a new surface where the rule says so for
+    /// a fragment `f` of which the tracker sees `s`. Returns the number of the
+    /// surface's first sample in this fragment and whether the surface is new.
     pub fn enter(&mut self, rule: SurfaceRule, s: SampleMask, f: &Fragment) -> (u32, bool) {
         let conflict = || s.iter().any(|sample| self.covered[sample]);
         let source = match rule {
@@ -53,13 +65,16 @@ impl SurfaceTracker {
             // The publication's counter has no stated width; ours wraps at 2^32.
             self.surface_id = self.surface_id.wrapping_add(1);
             self.covered.fill(false);
+            self.numbered = 0;
         }
-        (self.covered.count_ones() as u32, starts)
+        (self.numbered, starts)
     }
 
-    /// LK figure 7, line 18: the surface now holds these samples too.
-    pub fn hold(&mut self, s: SampleMask) {
+    /// LK figure 7, line 18: the surface now holds the samples `s` too, `numbered`
+    /// of which were numbered.
+    pub fn hold(&mut self, s: SampleMask, numbered: u32) {
         s.iter().for_each(|sample| self.covered.set(sample, true));
+        self.numbered += numbered;
     }
 
     /// The samples that the current surface holds.
@@ -68,12 +83,18 @@ impl SurfaceTracker {
     }
 
     /// Bits of state per pixel of `samples` samples that a rule takes.
-    pub fn state_bits(rule: SurfaceRule, samples: u32) -> u32 {
-        match rule {
-            SurfaceRule::Bitmask => samples + 32,
-            SurfaceRule::EveryFragment => 32,
-            SurfaceRule::Primitive | SurfaceRule::Object => samples + 64,
-        }
+    pub fn state_bits(rule: SurfaceRule, tracked: Tracked, samples: u32) -> u32 {
+        let (mask, source) = match rule {
+            SurfaceRule::EveryFragment => (0, 0),
+            SurfaceRule::Bitmask => (samples, 0),
+            SurfaceRule::Primitive | SurfaceRule::Object => (samples, 32),
+        };
+        // The counter runs from 0 to `samples`.
+        let counter = match tracked {
+            Tracked::Covered if mask > 0 => samples.ilog2() + 1,
+            _ => 0,
+        };
+        32 + mask + source + counter
     }
 }
 
@@ -102,7 +123,7 @@ mod tests {
         let rule = SurfaceRule::Bitmask;
         let mut draw = |mask: u64| {
             let entered = tracker.enter(rule, SampleMask(mask), &fragment(0, 0));
-            tracker.hold(SampleMask(mask));
+            tracker.hold(SampleMask(mask), mask.count_ones());
             (entered, tracker.surface_id, tracker.held().0)
         };
         assert_eq!(draw(0b0011), ((0, false), 0, 0b0011));
@@ -116,7 +137,7 @@ mod tests {
             let mut tracker = SurfaceTracker::default();
             for (primitive, object, mask) in fragments {
                 tracker.enter(rule, SampleMask(mask), &fragment(primitive, object));
-                tracker.hold(SampleMask(mask));
+                tracker.hold(SampleMask(mask), mask.count_ones());
             }
             tracker.surface_id
         };

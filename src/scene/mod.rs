@@ -223,6 +223,26 @@ impl Scene {
         Ok(())
     }
 
+    /// Makes every surface white, keeping alphas: the untextured models of the
+    /// publications.
+    pub fn whiten(&mut self) {
+        for material in &mut self.materials {
+            material.base = Vec3::ONE.extend(material.base.w);
+            material.emissive = Vec3::ZERO;
+        }
+        for texture in &mut self.textures {
+            texture.whiten();
+        }
+        for shape in &mut self.shapes {
+            let colours = match shape {
+                Shape::Mesh(mesh) => &mut mesh.colours,
+                Shape::Strands(strands) => &mut strands.colours,
+                Shape::Particles(particles) => &mut particles.colours,
+            };
+            colours.iter_mut().for_each(|c| *c = Vec3::ONE.extend(c.w));
+        }
+    }
+
     /// Checks that the scene can be drawn: indices in range, numbers finite,
     /// something there at all.
     fn check(&mut self) -> Result<()> {

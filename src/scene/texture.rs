@@ -121,6 +121,14 @@ impl Texture {
         })
     }
 
+    /// Makes every texel white, keeping alphas.
+    pub(super) fn whiten(&mut self) {
+        for [r, g, b, a] in self.levels.iter_mut().flat_map(|level| &mut level.texels) {
+            // Colours are stored multiplied by alpha.
+            (*r, *g, *b) = (*a, *a, *a);
+        }
+    }
+
     /// Texels across.
     pub fn width(&self) -> u32 {
         self.levels[0].width

@@ -1,4 +1,7 @@
 //! The integration tests: one binary, one file a subject.
 
+mod conformance;
+mod guarantees;
 mod trace_file;
+mod unbiased;
 mod util;

@@ -1,6 +1,10 @@
 //! What several tests share.
 
+use screendoor::design::{Configured, DESIGNS, Entry};
+use screendoor::param::Kind;
+use screendoor::picture::Picture;
 use screendoor::random::Stream;
+use screendoor::rop::ReplayOptions;
 use screendoor::trace::{
     ColourFormat, DepthPlane, Fragment, Header, SampleMask, SamplePattern, Trace, TraceWriter,
     Unorm32, WriteOptions,
@@ -68,4 +72,64 @@ pub fn trace_bytes(header: &Header, fragments: &[Fragment], options: WriteOption
 pub fn trace(header: &Header, fragments: &[Fragment]) -> Trace {
     let bytes = trace_bytes(header, fragments, WriteOptions::default());
     Trace::from_bytes(bytes, "test").unwrap()
+}
+
+/// Every design of the registry with its defaults, and with each of its
+/// parameters changed alone to each of its other values.
+pub fn all_variants() -> Vec<Configured> {
+    DESIGNS.iter().flat_map(variants).collect()
+}
+
+/// One design with its defaults and with each parameter changed alone.
+pub fn variants(entry: &Entry) -> Vec<Configured> {
+    let mut settings: Vec<Vec<(String, String)>> = vec![Vec::new()];
+    for param in entry.info.params {
+        let values: Vec<String> = match param.kind {
+            Kind::Flag => vec!["true".into(), "false".into()],
+            Kind::Choice { options } => options.iter().map(|o| o.name.into()).collect(),
+            Kind::Integer { min, max } => vec![min.to_string(), max.to_string()],
+            Kind::Real { min, max } => vec![min.to_string(), max.to_string()],
+        };
+        let changed = values.into_iter().filter(|v| v != param.default);
+        settings.extend(changed.map(|v| vec![(param.name.to_string(), v)]));
+    }
+    settings.iter().map(|given| entry.configure(given).unwrap()).collect()
+}
+
+/// The design of a spec such as `lk:sort=false`.
+pub fn design(spec: &str) -> Configured {
+    screendoor::design::configure(spec, &[]).unwrap()
+}
+
+/// The picture of `design` on `trace`.
+pub fn picture(design: &Configured, trace: &Trace, samples: u32, seed: u32) -> Picture {
+    design.replay(trace, samples, seed, &ReplayOptions::default()).unwrap().picture
+}
+
+/// A trace of `layers` fragments over every pixel of the frame, whole, one layer
+/// after the other from the first on; `layer` gives depth, colour and alpha.
+pub fn layered(
+    header: &Header,
+    layers: u32,
+    layer: impl Fn(u32) -> (u32, [f32; 3], f32),
+) -> Vec<Fragment> {
+    let mut fragments = Vec::new();
+    for i in 0..layers {
+        let (z, colour, alpha) = layer(i);
+        for y in 0..header.height as u16 {
+            for x in 0..header.width as u16 {
+                fragments.push(Fragment {
+                    x,
+                    y,
+                    coverage: SampleMask::first(header.pattern.samples()),
+                    depth: DepthPlane { z: Unorm32(z), dzdx: 0, dzdy: 0 },
+                    colour,
+                    alpha,
+                    primitive: i,
+                    object: i,
+                });
+            }
+        }
+    }
+    fragments
 }

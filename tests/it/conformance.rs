@@ -1,0 +1,283 @@
+//! What every design must do, whatever it is: the suite runs over the registry.
+
+use std::sync::Mutex;
+
+use screendoor::design::Configured;
+use screendoor::metrics::{Region, errors};
+use screendoor::random::Stream;
+use screendoor::rop::{ReplayOptions, Site};
+use screendoor::trace::{Fragment, SampleMask, Trace, Unorm32, WriteOptions};
+
+use crate::util::{
+    all_variants, design, header, layered, picture, random_fragments, trace, trace_bytes,
+};
+
+fn rmse(a: &screendoor::picture::Picture, b: &screendoor::picture::Picture) -> f64 {
+    errors(a, b, &Region::frame(a.grid())).rmse
+}
+
+#[test]
+fn threads_windows_and_batches_change_no_bit() {
+    for samples in [1, 8, 64] {
+        let header = header(83, 41, samples);
+        let fragments = random_fragments(&header, 6000, samples);
+        let whole = trace(&header, &fragments);
+        let options = WriteOptions { batch_rows: 61, ..WriteOptions::default() };
+        let cut = trace_bytes(&header, &fragments, options);
+        let cut = Trace::from_bytes(cut, "cut").unwrap();
+        for design in all_variants() {
+            let expected = picture(&design, &whole, samples, 3).hash();
+            for threads in [1, 2, 3] {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                for (trace, window) in [(&whole, 1 << 20), (&whole, 97), (&cut, 1000), (&cut, 1)] {
+                    if window == 1 && (threads != 2 || samples != 8) {
+                        continue;
+                    }
+                    let options = ReplayOptions { window, ..ReplayOptions::default() };
+                    let replayed =
+                        pool.install(|| design.replay(trace, samples, 3, &options)).unwrap();
+                    assert_eq!(
+                        replayed.picture.hash(),
+                        expected,
+                        "{}: {threads} threads, windows of {window}",
+                        design.label()
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_memory_limit_changes_no_bit() {
+    let header = header(50, 50, 4);
+    let mut fragments = random_fragments(&header, 5000, 2);
+    // One tile, and within it one pixel, that holds much.
+    let crowd = fragments[..2000].to_vec();
+    fragments.extend(crowd.into_iter().enumerate().map(|(i, f)| Fragment {
+        x: (i % 8) as u16,
+        y: if i % 4 == 0 { 3 } else { 0 },
+        ..f
+    }));
+    let trace = trace(&header, &fragments);
+    for design in all_variants() {
+        let expected = picture(&design, &trace, 4, 0).hash();
+        for memory in [1 << 30, 300_000, 60_000, 30_000] {
+            let options = ReplayOptions { memory, ..ReplayOptions::default() };
+            let replayed = design.replay(&trace, 4, 0, &options).unwrap();
+            assert_eq!(replayed.picture.hash(), expected, "{} in {memory}", design.label());
+        }
+    }
+    // Where one pixel alone is too much, the error names it.
+    let options = ReplayOptions { memory: 8000, ..ReplayOptions::default() };
+    let error = design("exact").replay(&trace, 4, 0, &options).unwrap_err().to_string();
+    assert!(error.contains("pixel") && error.contains("--memory"), "{error}");
+}
+
+#[test]
+fn an_empty_trace_shows_the_background() {
+    let mut header = header(20, 20, 8);
+    header.background = [0.25, 0.5, 0.75];
+    let trace = trace(&header, &[]);
+    for design in all_variants() {
+        let picture = picture(&design, &trace, 8, 0);
+        assert_eq!(picture.get(19, 19), [0.25, 0.5, 0.75], "{}", design.label());
+    }
+}
+
+#[test]
+fn opaque_fragments_give_the_exact_picture() {
+    for samples in [1, 2, 4, 8, 16, 32, 64] {
+        let mut header = header(40, 40, samples);
+        header.background = [0.5, 0.25, 0.125];
+        let mut fragments = random_fragments(&header, 4000, samples);
+        for (i, f) in fragments.iter_mut().enumerate() {
+            f.alpha = 1.0;
+            // Sums of few bits, exact in any precision; depths that 16 bits tell apart.
+            f.colour = f.colour.map(|c| (c * 64.0).floor() / 64.0);
+            f.depth.z = Unorm32((i as u32).wrapping_mul(40503) << 16);
+            (f.depth.dzdx, f.depth.dzdy) = (0, 0);
+        }
+        let trace = trace(&header, &fragments);
+        let exact = picture(&design("exact"), &trace, samples, 0);
+        for design in all_variants() {
+            let picture = picture(&design, &trace, samples, 9);
+            assert_eq!(picture.hash(), exact.hash(), "{} at {samples}", design.label());
+        }
+    }
+}
+
+#[test]
+fn alpha_0_leaves_nothing_and_one_fragment_is_right_on_average() {
+    let header = header(64, 64, 8);
+    let invisible = trace(&header, &layered(&header, 3, |i| (i, [1.0; 3], 0.0)));
+    let single = trace(&header, &layered(&header, 1, |_| (5, [1.0; 3], 0.3)));
+    for design in all_variants() {
+        assert_eq!(picture(&design, &invisible, 8, 0).get(7, 7), [0.0; 3], "{}", design.label());
+        // 64 × 64 pixels × 8 samples: the mean's deviation is below 0.0026 even for
+        // independent samples; six of them.
+        let exact = picture(&self::design("exact"), &single, 8, 0);
+        let picture = picture(&design, &single, 8, 0);
+        let mean = errors(&picture, &exact, &Region::frame(picture.grid())).mean;
+        assert!(mean.abs() < 0.016 * 255.0, "{}: {mean}", design.label());
+    }
+}
+
+#[test]
+fn of_64_equal_depths_the_last_opaque_one_lies_in_front() {
+    let header = header(8, 8, 16);
+    let fragments = layered(&header, 64, |i| (77, [i as f32 / 64.0; 3], 1.0));
+    let trace = trace(&header, &fragments);
+    for design in all_variants() {
+        let picture = picture(&design, &trace, 16, 0);
+        assert_eq!(picture.get(3, 3), [63.0 / 64.0; 3], "{}", design.label());
+    }
+}
+
+#[test]
+fn thousands_of_layers_in_one_pixel() {
+    let header = header(4, 4, 8);
+    let mut random = Stream::new([4]);
+    let fragments = layered(&header, 5000, |_| (0, [0.0; 3], 0.01));
+    let fragments: Vec<Fragment> = fragments
+        .into_iter()
+        .map(|mut f| {
+            f.depth.z = Unorm32(random.word());
+            f.colour = [random.unit(); 3];
+            f
+        })
+        .collect();
+    let trace = trace(&header, &fragments);
+    let exact = picture(&design("exact"), &trace, 8, 0);
+    for design in all_variants().iter().filter(|d| d.promises().unbiased) {
+        // The mean of 16 pixels of 8 samples: a spread of 0.29/√128 a seed; 6σ.
+        let picture = picture(design, &trace, 8, 0);
+        let mean = errors(&picture, &exact, &Region::frame(picture.grid())).mean / 255.0;
+        assert!(mean.abs() < 0.155, "{}: {mean}", design.label());
+    }
+}
+
+/// Random fragments at distinct depths; `pixels` of them hold all.
+fn distinct_depths(samples: u32) -> (screendoor::trace::Header, Vec<Fragment>) {
+    let header = header(16, 16, samples);
+    let mut fragments = random_fragments(&header, 3000, 12);
+    for (i, f) in fragments.iter_mut().enumerate() {
+        f.depth.z = Unorm32((i as u32).wrapping_mul(2_654_435_761));
+        (f.depth.dzdx, f.depth.dzdy) = (0, 0);
+    }
+    (header, fragments)
+}
+
+#[test]
+fn order_changes_the_picture_only_where_that_is_not_ruled_out() {
+    let (header, fragments) = distinct_depths(8);
+    let mut shuffled = fragments.clone();
+    Stream::new([99]).shuffle(&mut shuffled);
+    let (a, b) = (trace(&header, &fragments), trace(&header, &shuffled));
+    for design in all_variants() {
+        let label = design.label();
+        // Depths that are distinct in 32 bits are not in fewer.
+        if label.contains("depth-bits") {
+            continue;
+        }
+        let same = picture(&design, &a, 8, 1).hash() == picture(&design, &b, 8, 1).hash();
+        assert_eq!(same, design.promises().order_independent, "{label}");
+    }
+}
+
+#[test]
+fn more_samples_come_nearer_where_that_is_promised_and_only_there() {
+    let header = header(24, 24, 64);
+    let coherent = layered(&header, 8, |i| (1000 * i, [(i % 3) as f32 / 2.0; 3], 0.3));
+    let mut random = random_fragments(&header, 24 * 24 * 8, 31);
+    for f in &mut random {
+        f.coverage = SampleMask(u64::MAX);
+    }
+    let traces = [trace(&header, &coherent), trace(&header, &random)];
+    for design in all_variants() {
+        let gains = traces.each_ref().map(|trace| {
+            let error = |samples| {
+                let exact = picture(&self::design("exact"), trace, samples, 0);
+                rmse(&picture(&design, trace, samples, 5), &exact)
+            };
+            // From 2 to 64 samples independent sampling gains √32 = 5.7.
+            (error(2), error(64))
+        });
+        let nearer = gains.iter().all(|(few, many)| many * 3.0 <= *few);
+        assert_eq!(nearer, design.promises().consistent, "{}: {gains:?}", design.label());
+    }
+}
+
+#[test]
+fn counts_add_up_and_counting_changes_nothing() {
+    let header = header(40, 40, 16);
+    let fragments = random_fragments(&header, 5000, 21);
+    let trace = trace(&header, &fragments);
+    for samples in [4, 16] {
+        let mask = SampleMask::first(samples);
+        let covered: Vec<u32> =
+            fragments.iter().map(|f| (f.coverage & mask).count()).filter(|n| *n > 0).collect();
+        for design in all_variants() {
+            let options = ReplayOptions { count_events: true, ..ReplayOptions::default() };
+            let counted = design.replay(&trace, samples, 3, &options).unwrap();
+            assert_eq!(counted.picture.hash(), picture(&design, &trace, samples, 3).hash());
+            let events = counted.events.unwrap();
+            let label = design.label();
+            let passes = u64::from(counted.passes);
+            assert_eq!(events.fragments, covered.len() as u64 * passes, "{label}");
+            let tested = covered.iter().map(|n| u64::from(*n)).sum::<u64>() * passes;
+            assert_eq!(events.samples_tested, tested, "{label}");
+            assert!(events.samples_passed <= events.samples_tested, "{label}");
+            assert!(events.samples_written <= events.samples_tested, "{label}");
+            assert!(events.samples_written > 0 && events.state_bits_written > 0, "{label}");
+        }
+    }
+}
+
+#[test]
+fn explaining_a_pixel_tells_how_its_colour_came_about() {
+    let header = header(20, 20, 8);
+    let trace = trace(&header, &random_fragments(&header, 4000, 6));
+    for design in all_variants() {
+        let whole = picture(&design, &trace, 8, 2);
+        for (x, y) in [(0, 0), (7, 13), (19, 19)] {
+            let calls = Mutex::new(0);
+            let explanation = design
+                .explain(&trace, 8, 2, Site { x, y }, &|_, _| *calls.lock().unwrap() += 1)
+                .unwrap();
+            let expected = whole.get(x.into(), y.into());
+            assert_eq!(explanation.colour, expected, "{}", design.label());
+            assert!(!explanation.steps.is_empty() && *calls.lock().unwrap() > 0);
+            for step in &explanation.steps {
+                assert_eq!((step.fragment.x, step.fragment.y), (x, y));
+                let record = &step.record;
+                assert_eq!(record.covered, step.fragment.coverage);
+                let passed = record.passed.unwrap_or(record.covered);
+                assert_eq!(record.written & passed, record.written, "{}", design.label());
+            }
+        }
+        let outside = Site { x: 20, y: 0 };
+        let error = design.explain(&trace, 8, 2, outside, &|_, _| ()).unwrap_err().to_string();
+        assert!(error.contains("outside the frame"), "{error}");
+    }
+}
+
+#[test]
+fn seeds_name_pictures() {
+    let header = header(20, 20, 8);
+    let trace = trace(&header, &random_fragments(&header, 3000, 6));
+    for design in all_variants() {
+        let hash = |seed| picture(&design, &trace, 8, seed).hash();
+        assert_eq!(hash(4), hash(4));
+        // The reference has nothing random in it.
+        assert_eq!(hash(4) == hash(5), design.info().name == "exact", "{}", design.label());
+    }
+}
+
+#[test]
+fn labels_name_designs() {
+    let labels: Vec<String> = all_variants().iter().map(Configured::label).collect();
+    for label in &labels {
+        assert_eq!(&design(label).label(), label);
+    }
+}
