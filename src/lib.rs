@@ -10,6 +10,7 @@ pub mod output;
 pub mod param;
 pub mod picture;
 pub mod random;
+pub mod report;
 pub mod rop;
 pub mod scene;
 pub mod study;

@@ -28,7 +28,9 @@ use crate::capture::setup::{STEPS, ScreenTriangle, set_up};
 use crate::capture::shade::Shader;
 use crate::error::{Error, Result};
 use crate::scene::Scene;
-use crate::trace::{ColourFormat, ColumnId, Fragment, Header, Scalar, TraceWriter};
+use crate::trace::{
+    ColourFormat, ColumnId, Fragment, Header, Scalar, Trace, TraceWriter, WriteOptions,
+};
 
 crate::options! {
     /// Which sides of surfaces are drawn.
@@ -194,6 +196,18 @@ impl<'a> Capture<'a> {
             progress(end as u64, total as u64);
         }
         write_all(writer, finished)
+    }
+
+    /// Draws the scene into a trace in memory.
+    ///
+    /// # Errors
+    /// As [`TraceWriter::push`].
+    pub fn to_memory(&self, progress: impl FnMut(u64, u64) + Send) -> Result<Trace> {
+        let source = &self.header.source;
+        let options = WriteOptions::default();
+        let mut writer = TraceWriter::new(Vec::new(), source, self.header.clone(), options)?;
+        self.draw(&mut writer, progress)?;
+        Trace::from_bytes(writer.finish()?.0, source)
     }
 
     fn prepare(&self, triangle: Triangle, shader: &Shader<'_>) -> Drawn {

@@ -82,10 +82,10 @@ impl<'a> Shader<'a> {
     pub fn shade(&self, triangle: &Triangle, weights: &Weights) -> Option<([f32; 3], f32)> {
         let material = self.material(triangle.material);
         let [a, b, c] = &triangle.vertices;
-        let mix = |w: &[f64; 3], a: Vec4, b: Vec4, c: Vec4| {
-            a * w[0] as f32 + b * w[1] as f32 + c * w[2] as f32
-        };
-        let mut base = material.base * mix(&weights.at, a.colour, b.colour, c.colour);
+        // From the first vertex on, so that what is equal at all three stays exactly that.
+        let [_, w1, w2] = weights.at.map(|w| w as f32);
+        let colour = a.colour + (b.colour - a.colour) * w1 + (c.colour - a.colour) * w2;
+        let mut base = material.base * colour;
         // The weights' changes add up to 0.
         let turned = |w: &[f64; 3]| (b.uv - a.uv) * w[1] as f32 + (c.uv - a.uv) * w[2] as f32;
         let uv = a.uv + turned(&weights.at);
@@ -96,11 +96,10 @@ impl<'a> Shader<'a> {
             self.scene.textures[t.texture].sample(at, dx, dy)
         };
         let base_texel = material.base_texture.map_or(Vec4::ONE, texel);
-        // What the texture and the vertices say; the material's own factor is what
+        // What the textures and the vertices say; the material's own factor is what
         // `--alpha` replaces.
-        let detail_alpha = base_texel.w
-            * material.alpha_texture.map_or(1.0, |t| texel(t).x)
-            * if material.base.w > 0.0 { base.w / material.base.w } else { 1.0 };
+        let detail_alpha =
+            colour.w * base_texel.w * material.alpha_texture.map_or(1.0, |t| texel(t).x);
         base *= base_texel;
 
         let own = self.alpha.unwrap_or(material.base.w);

@@ -9,6 +9,7 @@ mod designs;
 mod explain;
 mod info;
 mod replay;
+mod reproduce;
 mod scenes;
 mod verify;
 
@@ -46,6 +47,7 @@ enum Command {
     Designs(designs::Arguments),
     Scenes(scenes::Arguments),
     Verify(verify::Arguments),
+    Reproduce(reproduce::Arguments),
 }
 
 /// Parses the process's arguments and runs the command.
@@ -83,5 +85,6 @@ fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         Command::Designs(a) => designs::run(a, console),
         Command::Scenes(a) => scenes::run(a, console),
         Command::Verify(a) => verify::run(a, console),
+        Command::Reproduce(a) => reproduce::run(a, console),
     }
 }

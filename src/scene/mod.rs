@@ -263,11 +263,37 @@ impl Scene {
             let hint = "give a scene with at least one triangle";
             return Err(Error::invalid(source, "the scene has no triangles", hint));
         }
+        let flat = self.flat_triangles();
+        if flat == self.triangle_count() {
+            let what = format_args!("all of its {flat} triangles have no area").to_string();
+            return Err(Error::invalid(source, what, "give a scene with something to see"));
+        }
         if u32::try_from(self.triangle_count()).is_err() {
             let hint = "split the scene";
             return Err(Error::unsupported(source, "it has more than 2^32 triangles", hint));
         }
+        if flat > 0 {
+            let warning = format!("{source}: {flat} triangles have no area and draw nothing");
+            self.warnings.push(warning);
+        }
         Ok(())
+    }
+
+    /// How many triangles of meshes have no area.
+    fn flat_triangles(&self) -> usize {
+        let of_shape = |shape: &Shape| match shape {
+            Shape::Mesh(mesh) => mesh
+                .triangles
+                .iter()
+                .filter(|t| {
+                    let [a, b, c] = t.map(|i| mesh.positions[i as usize].as_dvec3());
+                    (b - a).cross(c - a) == DVec3::ZERO
+                })
+                .count(),
+            Shape::Strands(_) | Shape::Particles(_) => 0,
+        };
+        let by_shape: Vec<usize> = self.shapes.iter().map(of_shape).collect();
+        self.objects.iter().map(|o| by_shape[o.shape]).sum()
     }
 }
 

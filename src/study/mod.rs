@@ -1,5 +1,7 @@
 //! From a trace and a plan to measured records: what every report is made of.
 
+pub mod publications;
+
 use std::time::Instant;
 
 use serde::Serialize;
@@ -38,8 +40,8 @@ pub struct Run {
     pub interior: EnsembleErrors,
     /// The same over the other covered pixels.
     pub edges: EnsembleErrors,
-    /// Root mean square error over the frame against the exact picture of all of
-    /// the trace's samples, on linear values: antialiasing counts.
+    /// Root mean square error over all covered pixels against the exact picture of
+    /// all of the trace's samples, on linear values: antialiasing counts.
     pub rmse_fine: Estimate,
     /// The same on sRGB-encoded values.
     pub rmse_fine_srgb: Estimate,
@@ -89,6 +91,7 @@ pub fn measure(
 
     progress(REFERENCE, done, total);
     let fine = exact.replay(trace, all, 0, &options)?.picture;
+    let fine_covered = PixelClasses::of(trace, all)?.covered;
     done += 1;
     let mut measurements = Measurements { runs: Vec::new(), references: Vec::new() };
     for samples in &plan.samples {
@@ -115,7 +118,7 @@ pub fn measure(
                 let replayed = design.replay(trace, *samples, seed, &options)?;
                 seconds.push(start.elapsed().as_secs_f64());
                 ensemble.add(&replayed.picture);
-                let against_fine = errors(&replayed.picture, &fine, &frame);
+                let against_fine = errors(&replayed.picture, &fine, &fine_covered);
                 squares.push(against_fine.rmse * against_fine.rmse);
                 squares_srgb.push(against_fine.rmse_srgb * against_fine.rmse_srgb);
                 first.get_or_insert(replayed);

@@ -2,9 +2,7 @@
 
 use screendoor::capture::{Capture, CaptureOptions};
 use screendoor::random::Stream;
-use screendoor::trace::{
-    DepthPlane, Fragment, Header, SampleMask, Trace, TraceWriter, Unorm32, WriteOptions,
-};
+use screendoor::trace::{DepthPlane, Fragment, Header, SampleMask, Trace, Unorm32};
 
 use crate::util::{design, header, layered, picture, trace};
 
@@ -136,11 +134,7 @@ fn the_five_quads_of_figure_1_leave_no_trace() {
         let options =
             CaptureOptions { width: 160, height: 160, samples, ..CaptureOptions::default() };
         let capture = Capture::new(&scene, &options).unwrap();
-        let header = capture.header().clone();
-        let mut writer =
-            TraceWriter::new(Vec::new(), "ramps", header, WriteOptions::default()).unwrap();
-        capture.draw(&mut writer, |_, _| ()).unwrap();
-        let trace = Trace::from_bytes(writer.finish().unwrap().0, "ramps").unwrap();
+        let trace = capture.to_memory(|_, _| ()).unwrap();
         // Well within the lowest band, which is drawn as five quads of alpha 0.75.
         let off = |spec: &str| {
             let picture = picture(&design(spec), &trace, samples, 0);

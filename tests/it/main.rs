@@ -2,6 +2,7 @@
 
 mod conformance;
 mod guarantees;
+mod hostile;
 mod trace_file;
 mod unbiased;
 mod util;
