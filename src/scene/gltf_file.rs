@@ -98,7 +98,8 @@ impl Loader {
                 "put the file beside the scene and name it without '..'",
             ));
         }
-        read_file(&self.folder.join(relative)).map(Cow::Owned)
+        let bytes = read_file(&self.folder.join(relative));
+        bytes.map(Cow::Owned).map_err(|e| self.bad(part, e, "put the file beside the scene"))
     }
 
     fn read_buffers(
