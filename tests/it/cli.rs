@@ -1,0 +1,352 @@
+//! The program as its users run it.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+use screendoor::picture;
+use serde_json::Value;
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_screendoor");
+
+/// A folder of its own and the program run in it.
+struct Workplace(tempfile::TempDir);
+
+impl Workplace {
+    fn new() -> Self {
+        Workplace(tempfile::tempdir().unwrap())
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn run(&self, arguments: &[&str]) -> Output {
+        Command::new(PROGRAM).args(arguments).current_dir(self.0.path()).output().unwrap()
+    }
+
+    /// Runs what must succeed; its standard output.
+    fn good(&self, arguments: &[&str]) -> String {
+        let output = self.run(arguments);
+        let error = String::from_utf8_lossy(&output.stderr).to_string();
+        assert!(output.status.success(), "{arguments:?}: {error}");
+        String::from_utf8(output.stdout).unwrap()
+    }
+
+    /// Runs what must fail; its exit code and its one line of error.
+    fn bad(&self, arguments: &[&str]) -> (i32, String) {
+        let output = self.run(arguments);
+        let error = String::from_utf8_lossy(&output.stderr).to_string();
+        let code = output.status.code().unwrap_or_else(|| panic!("{arguments:?}: {error}"));
+        assert!(code == 1 || code == 2, "{arguments:?} ended with {code}: {error}");
+        (code, error)
+    }
+
+    /// A small trace to work on.
+    fn with_trace() -> Self {
+        let place = Workplace::new();
+        place.good(&["capture", "builtin:ramps", "-o", "t.arrow", "--size", "48x40"]);
+        place
+    }
+}
+
+#[test]
+fn a_scene_becomes_a_trace_a_picture_and_figures() {
+    let place = Workplace::with_trace();
+    let info: Value =
+        serde_json::from_str(&place.good(&["info", "t.arrow", "--json", "-"])).unwrap();
+    let fragments = info["statistics"]["fragments"].as_u64().unwrap();
+    assert!(fragments > 1000);
+    assert_eq!(info["header"]["width"], 48);
+    assert!(place.good(&["info", "t.arrow"]).contains("depth complexity"));
+    assert!(place.good(&["verify", "t.arrow"]).contains("hold"));
+
+    let json = place.good(&[
+        "replay",
+        "t.arrow",
+        "--design",
+        "lk",
+        "--samples",
+        "8",
+        "--seed",
+        "3",
+        "--exact",
+        "--json",
+        "-",
+        "-o",
+        "a.exr",
+        "-o",
+        "a.png",
+    ]);
+    let result: Value = serde_json::from_str(&json).unwrap();
+    assert_eq!((&result["design"], &result["samples"]), (&"lk".into(), &8.into()));
+    assert!(result["errors"]["frame"]["rmse"]["value"].as_f64().unwrap() > 0.1);
+    assert!(result["events"]["fragments"].as_u64().unwrap() <= fragments);
+    let colour = picture::read(place.path("a.exr"), Some("colour")).unwrap();
+    assert_eq!((colour.width(), colour.height()), (48, 40));
+    for layer in ["reference", "error"] {
+        assert!(picture::read(place.path("a.exr"), Some(layer)).is_ok());
+    }
+    assert!(picture::read(place.path("a.png"), None).is_ok());
+
+    // The figures that compare gives are those that replay gave.
+    let compared = place.good(&[
+        "compare",
+        "a.exr",
+        "a.exr",
+        "--layer",
+        "colour",
+        "--reference-layer",
+        "reference",
+        "--json",
+        "-",
+    ]);
+    let compared: Value = serde_json::from_str(&compared).unwrap();
+    let (a, b) = (&compared["errors"]["rmse"], &result["errors"]["frame"]["rmse"]["value"]);
+    assert!((a.as_f64().unwrap() - b.as_f64().unwrap()).abs() < 1e-4);
+    assert!(place.good(&["compare", "a.png", "a.png"]).contains("identical"));
+}
+
+#[test]
+fn the_same_run_gives_the_same_picture_whatever_the_threads() {
+    let place = Workplace::with_trace();
+    let hash = |threads: &str, window: &str| {
+        let json = place.good(&[
+            "--threads",
+            threads,
+            "replay",
+            "t.arrow",
+            "--samples",
+            "16",
+            "--window",
+            window,
+            "--json",
+            "-",
+        ]);
+        serde_json::from_str::<Value>(&json).unwrap()["picture"].clone()
+    };
+    assert_eq!(hash("1", "1000000"), hash("2", "333"));
+    place.good(&[
+        "--threads",
+        "1",
+        "capture",
+        "builtin:ramps",
+        "-o",
+        "one.arrow",
+        "--size",
+        "48x40",
+    ]);
+    let (a, b) = (fs::read(place.path("t.arrow")), fs::read(place.path("one.arrow")));
+    assert_eq!(a.unwrap(), b.unwrap());
+}
+
+#[test]
+fn several_seeds_tell_variance_from_bias() {
+    let place = Workplace::with_trace();
+    let json = place.good(&["replay", "t.arrow", "--samples", "4", "--seeds", "8", "--json", "-"]);
+    let errors = &serde_json::from_str::<Value>(&json).unwrap()["errors"]["covered"];
+    assert_eq!(errors["seeds"], 8);
+    assert!(errors["variance"].as_f64().unwrap() > 1.0);
+    assert!(
+        errors["bias_squared"].as_f64().unwrap().abs() < errors["variance"].as_f64().unwrap() / 4.0
+    );
+    let rmse = &errors["rmse"];
+    assert!(rmse["low"].as_f64() < rmse["value"].as_f64());
+}
+
+#[test]
+fn explain_tells_the_story_of_a_pixel() {
+    let place = Workplace::with_trace();
+    let text = place.good(&["explain", "t.arrow", "--pixel", "24,36", "--samples", "8"]);
+    for word in ["covers", "sorted", "references", "writes", "samples", "surface", "resolved"] {
+        assert!(text.contains(word), "{word}:\n{text}");
+    }
+    let json =
+        place.good(&["explain", "t.arrow", "--pixel", "24,36", "--samples", "8", "--json", "-"]);
+    let story: Value = serde_json::from_str(&json).unwrap();
+    let step = &story["steps"][0];
+    assert_eq!(step["record"]["covered"].as_array().unwrap().len(), 8);
+    assert_eq!(step["contents"]["samples"].as_array().unwrap().len(), 8);
+    assert!(place.good(&["explain", "t.arrow", "--pixel", "0,0"]).contains("no fragment"));
+}
+
+#[test]
+fn designs_and_scenes_are_listed_from_their_registries() {
+    let place = Workplace::new();
+    let list: Value = serde_json::from_str(&place.good(&["designs", "--json"])).unwrap();
+    let text = place.good(&["designs"]);
+    for design in list.as_array().unwrap() {
+        assert!(text.contains(design["citation"].as_str().unwrap()));
+        for param in design["params"].as_array().unwrap() {
+            assert!(text.contains(param["help"].as_str().unwrap()));
+        }
+    }
+    assert_eq!(list.as_array().unwrap().len(), screendoor::design::DESIGNS.len());
+    let scenes = place.good(&["scenes"]);
+    for scene in screendoor::scene::builtin::BUILTINS {
+        assert!(scenes.contains(&format!("builtin:{}", scene.name)));
+    }
+}
+
+#[test]
+fn wrong_requests_end_with_2_and_a_hint() {
+    let place = Workplace::with_trace();
+    let cases: &[(&[&str], &str)] = &[
+        (&["replay", "t.arrow", "-d", "endertn"], "did you mean 'enderton'?"),
+        (&["replay", "t.arrow", "--set", "sorted=false"], "did you mean 'sort'?"),
+        (&["replay", "t.arrow", "--set", "sort=maybe"], "it takes true|false"),
+        (&["replay", "t.arrow", "--set", "surfaces=bitmaks"], "did you mean 'bitmask'?"),
+        (&["replay", "t.arrow", "--samples", "3"], "is 1, 2, 4, 8, 16, 32 or 64"),
+        (&["replay", "t.arrow", "-o", "a.jpg"], "name a .exr or .png file"),
+        (&["replay", "t.arrow", "--seeds", "0"], "--seeds"),
+        (&["capture", "builtin:engin", "-o", "x.arrow"], "unknown built-in scene 'engin'"),
+        (&["capture", "builtin:layers:count=0", "-o", "x.arrow"], "it takes 1..100000"),
+        (&["capture", "builtin:ramps", "-o", "x.arrow", "--size", "0x100"], "each side 1 to 65536"),
+        (&["capture", "builtin:ramps", "-o", "x.arrow", "--size", "999999999999x1"], "each side"),
+        (
+            &["capture", "builtin:ramps", "-o", "x.arrow", "--alpha", "nan"],
+            "an alpha lies in [0, 1]",
+        ),
+        (
+            &["capture", "builtin:ramps", "-o", "x.arrow", "--pattern", "standard"],
+            "no standard pattern of 64",
+        ),
+        (&["capture", "builtin:ramps", "-o", "x.arrow", "--fov", "500"], "field of view"),
+        (&["capture", "model.step", "-o", "x.arrow"], "do not come as '.step'"),
+        (&["capture", "builtin:ramps", "-o", "."], "it is a folder"),
+        (&["explain", "t.arrow", "--pixel", "99,0"], "outside the frame"),
+        (&["explain", "t.arrow", "--pixel", "1.5,0"], "no pixel coordinate"),
+        (&["compare", "t.arrow", "t.arrow"], "no picture that can be read"),
+        (&["frobnicate"], "frobnicate"),
+        (&[], "Usage"),
+    ];
+    for (arguments, says) in cases {
+        let (code, error) = place.bad(arguments);
+        assert_eq!(code, 2, "{arguments:?}: {error}");
+        assert!(error.contains(says), "{arguments:?}: {error}");
+    }
+    assert!(!place.path("x.arrow").exists());
+}
+
+#[test]
+fn a_standard_trace_serves_its_own_count_only() {
+    let place = Workplace::new();
+    place.good(&["capture", "builtin:ramps", "-o", "s.arrow", "--size", "20x20", "--samples", "8"]);
+    place.good(&["replay", "s.arrow"]);
+    let (code, error) = place.bad(&["replay", "s.arrow", "--samples", "4"]);
+    assert_eq!(code, 2);
+    assert!(error.contains("--samples 64"), "{error}");
+}
+
+#[test]
+fn bad_files_end_with_1_and_one_line() {
+    let place = Workplace::with_trace();
+    let whole = fs::read(place.path("t.arrow")).unwrap();
+    fs::write(place.path("cut.arrow"), &whole[..whole.len() - 9]).unwrap();
+    fs::write(place.path("text.exr"), "not a picture").unwrap();
+    let cases: &[(&[&str], &str)] = &[
+        (&["info", "missing.arrow"], "cannot read missing.arrow: No such file"),
+        (&["replay", "cut.arrow"], "cut.arrow: its end is missing (truncated)"),
+        (&["verify", "t.arrow", "cut.arrow"], "cut.arrow"),
+        (&["capture", "missing.obj", "-o", "x.arrow"], "cannot read missing.obj"),
+        (&["compare", "text.exr", "text.exr"], "text.exr"),
+        (&["capture", "builtin:ramps", "-o", "no/such/folder/x.arrow"], "cannot create"),
+    ];
+    for (arguments, says) in cases {
+        let (code, error) = place.bad(arguments);
+        assert_eq!(code, 1, "{arguments:?}: {error}");
+        assert!(error.contains(says), "{arguments:?}: {error}");
+        assert_eq!(error.trim_end().lines().count(), 1, "{error}");
+        assert!(error.starts_with("screendoor: error: "), "{error}");
+    }
+}
+
+/// Runs a shell command; exit code and standard error.
+#[cfg(unix)]
+fn shell(place: &Workplace, command: &str) -> (Option<i32>, String) {
+    let output = Command::new("sh")
+        .args(["-c", command])
+        .env("PROGRAM", PROGRAM)
+        .current_dir(place.0.path())
+        .stdin(Stdio::null())
+        .output()
+        .unwrap();
+    (output.status.code(), String::from_utf8_lossy(&output.stderr).to_string())
+}
+
+#[cfg(unix)]
+fn files(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().to_string_lossy().to_string())
+        .collect();
+    names.sort();
+    names
+}
+
+#[test]
+#[cfg(unix)]
+fn a_full_disk_leaves_the_good_file_and_nothing_else() {
+    let place = Workplace::with_trace();
+    place.good(&["replay", "t.arrow", "-o", "p.exr", "-o", "p.png"]);
+    let before: Vec<_> =
+        ["t.arrow", "p.exr", "p.png"].iter().map(|f| fs::read(place.path(f)).unwrap()).collect();
+    // No file may grow beyond one block of 512 bytes: writes fail as on a full disk.
+    let limited = "trap '' XFSZ; ulimit -f 1; exec \"$PROGRAM\"";
+    for command in [
+        "capture builtin:ramps -o t.arrow --size 200x200",
+        "replay t.arrow -o p.exr",
+        "replay t.arrow --samples 4 -o p.png",
+    ] {
+        let (code, error) = shell(&place, &format!("{limited} {command}"));
+        assert_eq!(code, Some(1), "{command}: {error}");
+        assert!(error.contains("cannot write"), "{error}");
+        assert_eq!(error.trim_end().lines().count(), 1, "{error}");
+    }
+    assert_eq!(files(place.0.path()), ["p.exr", "p.png", "t.arrow"]);
+    for (name, bytes) in ["t.arrow", "p.exr", "p.png"].iter().zip(before) {
+        assert_eq!(fs::read(place.path(name)).unwrap(), bytes);
+    }
+    // A device that is always full, and one that takes everything.
+    if Path::new("/dev/full").exists() {
+        let (code, error) = shell(&place, "exec \"$PROGRAM\" capture builtin:ramps -o /dev/full");
+        assert_eq!(code, Some(1), "{error}");
+        assert!(error.contains("cannot write /dev/full"), "{error}");
+    }
+    assert_eq!(shell(&place, "exec \"$PROGRAM\" capture builtin:ramps -o /dev/null").0, Some(0));
+    assert!(!fs::metadata("/dev/null").unwrap().is_file());
+}
+
+#[test]
+#[cfg(unix)]
+fn a_reader_that_has_seen_enough_is_no_error() {
+    let place = Workplace::with_trace();
+    for command in ["designs", "info t.arrow", "explain t.arrow --pixel 24,36", "designs --json"] {
+        let (code, error) =
+            shell(&place, &format!("\"$PROGRAM\" {command} | head -n 1 >/dev/null"));
+        assert_eq!((code, error.as_str()), (Some(0), ""), "{command}");
+        let (_, error) = shell(&place, &format!("\"$PROGRAM\" {command} >&-"));
+        assert!(!error.contains("panicked"), "{error}");
+    }
+}
+
+#[test]
+fn progress_stays_out_of_what_is_no_terminal() {
+    let place = Workplace::with_trace();
+    let output = place.run(&["replay", "t.arrow", "--exact"]);
+    assert!(output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+fn the_demo_does_the_main_job() {
+    let place = Workplace::new();
+    let text = place.good(&["demo", "--scene", "builtin:ramps", "--output", "out"]);
+    for design in ["lk", "enderton"] {
+        for samples in [4, 8, 16] {
+            assert!(text.contains(design));
+            for ending in ["png", "exr"] {
+                assert!(place.path(&format!("out/{design}-{samples}.{ending}")).exists());
+            }
+        }
+    }
+}
