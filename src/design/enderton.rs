@@ -4,6 +4,7 @@
 use crate::error::Result;
 use crate::param::{Param, Values};
 use crate::random::hash;
+use crate::resolve::box_filter;
 use crate::rop::{
     Blueprint, Contents, Design, Family, Frame, Info, Probe, Promises, Samples, Site, StateBits,
     Threshold, depth_bits, sample_depths,
@@ -159,7 +160,7 @@ impl<const N: usize> Design for EndertonAt<N> {
     }
 
     fn resolve(&self, _site: Site, samples: &Samples<N>) -> [f64; 3] {
-        samples.mean()
+        box_filter(&samples.colour)
     }
 
     fn contents(&self, samples: &Samples<N>) -> Contents {

@@ -6,6 +6,7 @@
 
 use crate::error::Result;
 use crate::param::{Param, Values};
+use crate::resolve::box_filter;
 use crate::rop::{
     Blueprint, Contents, Design, Family, Frame, Info, PixelIndex, PixelOrder, Probe, Promises,
     Reference, ReferenceKey, SampleList, Samples, Site, StateBits, SurfaceRule, SurfaceTracker,
@@ -205,7 +206,7 @@ impl<const N: usize> Design for LaineKarrasAt<N> {
     }
 
     fn resolve(&self, _site: Site, p: &Self::Pixel) -> [f64; 3] {
-        p.samples.mean()
+        box_filter(&p.samples.colour)
     }
 
     fn contents(&self, p: &Self::Pixel) -> Contents {

@@ -158,6 +158,8 @@ pub enum Family {
     Reference,
     /// Random coverage of samples and an ordinary depth test.
     Stochastic,
+    /// Blending, merging or keeping a bounded number of layers.
+    Deterministic,
 }
 
 /// What a listing says about a design.

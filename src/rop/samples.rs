@@ -34,17 +34,6 @@ impl<const N: usize> Samples<N> {
         covered.iter().filter(|s| z[*s] <= self.depth[*s]).collect()
     }
 
-    /// Box filter: the samples' mean, summed in sample order in single precision.
-    pub fn mean(&self) -> [f64; 3] {
-        let mut sum = [0.0_f32; 3];
-        for colour in &self.colour {
-            for (s, c) in sum.iter_mut().zip(colour) {
-                *s += c;
-            }
-        }
-        sum.map(|s| f64::from(s / N as f32))
-    }
-
     /// The samples as `explain` shows them.
     pub fn contents(&self) -> Vec<SampleContents> {
         let pairs = self.depth.iter().zip(&self.colour);
@@ -100,12 +89,5 @@ mod tests {
         let samples = Samples { depth: [1, 2, 3, 4].map(Unorm32), colour: [[0.0; 3]; 4] };
         let passed = samples.depth_test(SampleMask(0b0111), &[Unorm32(2); 4]);
         assert_eq!(passed, SampleMask(0b0110));
-    }
-
-    #[test]
-    fn the_mean_is_summed_in_single_precision() {
-        let mut samples = Samples::<4>::cleared([0.0; 3]);
-        samples.write(2, Unorm32(0), [1.0, 0.5, 0.0]);
-        assert_eq!(samples.mean(), [0.25, 0.125, 0.0]);
     }
 }

@@ -16,7 +16,7 @@ use arrow_array::{
 use arrow_ipc::CompressionType;
 use arrow_ipc::reader::FileReader;
 use arrow_ipc::writer::{FileWriter, IpcWriteOptions};
-use arrow_schema::{DataType, Field, Schema};
+use arrow_schema::{Field, Schema};
 use screendoor::capture::{Capture, CaptureOptions};
 use screendoor::trace::{Header, Trace, WriteOptions};
 

@@ -4,6 +4,8 @@ mod cli;
 mod conformance;
 mod guarantees;
 mod hostile;
+mod layering;
+mod python;
 mod trace_file;
 mod unbiased;
 mod util;

@@ -200,7 +200,7 @@ impl Design for PlantedAt {
         }
     }
     fn resolve(&self, _: Site, samples: &Samples<8>) -> [f64; 3] {
-        samples.mean()
+        screendoor::resolve::box_filter(&samples.colour)
     }
     fn contents(&self, _: &Samples<8>) -> Contents {
         Contents::default()
