@@ -85,7 +85,11 @@ impl<'a> Shader<'a> {
         let mix = |w: &[f64; 3], a: Vec4, b: Vec4, c: Vec4| {
             a * w[0] as f32 + b * w[1] as f32 + c * w[2] as f32
         };
-        let mut base = material.base * mix(&weights.at, a.colour, b.colour, c.colour);
+        let mut vertex = mix(&weights.at, a.colour, b.colour, c.colour);
+        if a.colour.w == b.colour.w && b.colour.w == c.colour.w {
+            // The weights' sum is 1 but for rounding, which a constant must not show.
+            vertex.w = a.colour.w;
+        }
         let uv = |w: &[f64; 3]| a.uv * w[0] as f32 + b.uv * w[1] as f32 + c.uv * w[2] as f32;
         let texel = |t: TextureUse| {
             let turn = |v: Vec2| t.transform.matrix2 * v;
@@ -96,10 +100,9 @@ impl<'a> Shader<'a> {
         let base_texel = material.base_texture.map_or(Vec4::ONE, texel);
         // What the texture and the vertices say; the material's own factor is what
         // `--alpha` replaces.
-        let detail_alpha = base_texel.w
-            * material.alpha_texture.map_or(1.0, |t| texel(t).x)
-            * if material.base.w > 0.0 { base.w / material.base.w } else { 1.0 };
-        base *= base_texel;
+        let detail_alpha =
+            vertex.w * base_texel.w * material.alpha_texture.map_or(1.0, |t| texel(t).x);
+        let base = material.base * vertex * base_texel;
 
         let own = self.alpha.unwrap_or(material.base.w);
         let mut alpha = match material.alpha_mode {
