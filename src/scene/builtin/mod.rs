@@ -1,7 +1,11 @@
 //! Scenes made from parameters, deterministic from their seed.
 
+mod glass;
 mod layers;
+mod noise;
+mod outlines;
 mod ramps;
+mod shapes;
 
 use crate::error::{Error, Result};
 use crate::param::{Param, Values, parse_spec};
@@ -20,7 +24,7 @@ pub struct Builtin {
 }
 
 /// All built-in scenes.
-pub const BUILTINS: &[Builtin] = &[layers::SCENE, ramps::SCENE];
+pub const BUILTINS: &[Builtin] = &[layers::SCENE, ramps::SCENE, glass::SCENE];
 
 /// The seed that every random scene takes.
 const SEED: Param = Param::integer("seed", "1", (0, u32::MAX as i64), "which of its variants");
