@@ -1,5 +1,6 @@
 //! Scenes made from parameters, deterministic from their seed.
 
+mod cloth;
 mod engine;
 mod glass;
 mod layers;
@@ -25,7 +26,8 @@ pub struct Builtin {
 }
 
 /// All built-in scenes.
-pub const BUILTINS: &[Builtin] = &[layers::SCENE, ramps::SCENE, engine::SCENE, glass::SCENE];
+pub const BUILTINS: &[Builtin] =
+    &[layers::SCENE, ramps::SCENE, engine::SCENE, cloth::SCENE, glass::SCENE];
 
 /// The seed that every random scene takes.
 const SEED: Param = Param::integer("seed", "1", (0, u32::MAX as i64), "which of its variants");
