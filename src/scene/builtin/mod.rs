@@ -3,6 +3,7 @@
 mod cloth;
 mod engine;
 mod glass;
+mod hair;
 mod layers;
 mod noise;
 mod outlines;
@@ -27,7 +28,7 @@ pub struct Builtin {
 
 /// All built-in scenes.
 pub const BUILTINS: &[Builtin] =
-    &[layers::SCENE, ramps::SCENE, engine::SCENE, cloth::SCENE, glass::SCENE];
+    &[layers::SCENE, ramps::SCENE, engine::SCENE, cloth::SCENE, hair::SCENE, glass::SCENE];
 
 /// The seed that every random scene takes.
 const SEED: Param = Param::integer("seed", "1", (0, u32::MAX as i64), "which of its variants");
