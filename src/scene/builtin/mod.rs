@@ -9,6 +9,7 @@ mod noise;
 mod outlines;
 mod ramps;
 mod shapes;
+mod smoke;
 
 use crate::error::{Error, Result};
 use crate::param::{Param, Values, parse_spec};
@@ -27,8 +28,15 @@ pub struct Builtin {
 }
 
 /// All built-in scenes.
-pub const BUILTINS: &[Builtin] =
-    &[layers::SCENE, ramps::SCENE, engine::SCENE, cloth::SCENE, hair::SCENE, glass::SCENE];
+pub const BUILTINS: &[Builtin] = &[
+    layers::SCENE,
+    ramps::SCENE,
+    engine::SCENE,
+    cloth::SCENE,
+    hair::SCENE,
+    smoke::SCENE,
+    glass::SCENE,
+];
 
 /// The seed that every random scene takes.
 const SEED: Param = Param::integer("seed", "1", (0, u32::MAX as i64), "which of its variants");
