@@ -2,6 +2,7 @@
 
 mod cloth;
 mod engine;
+mod foliage;
 mod glass;
 mod hair;
 mod layers;
@@ -35,6 +36,7 @@ pub const BUILTINS: &[Builtin] = &[
     cloth::SCENE,
     hair::SCENE,
     smoke::SCENE,
+    foliage::SCENE,
     glass::SCENE,
 ];
 
