@@ -1,10 +1,10 @@
 //! Sheets of coloured acrylic that stand through one another.
 
-use glam::{DAffine3, Vec3};
+use glam::{DAffine3, Vec2, Vec3};
 
 use crate::param::{Param, Values};
 use crate::random::Stream;
-use crate::scene::builtin::outlines::rounded;
+use crate::scene::builtin::outlines::direction;
 use crate::scene::builtin::shapes::Solid;
 use crate::scene::builtin::{Builtin, SEED, seed};
 use crate::scene::{Material, Object, Scene, Shape, View};
@@ -56,10 +56,26 @@ fn build(values: &Values) -> Scene {
 
 /// A pane around the origin that faces z: its face and the wall of its rim.
 fn pane(half: [f32; 2]) -> Solid {
-    let outline = rounded(half, 0.07, 160);
+    let outline = outline(Vec2::from_array(half), 0.07);
+    let n = outline.len();
+    // Upright chords from the right to the left: no point where many triangles meet.
+    let chord = |i: usize| [n - 1 - i, i].map(|k| outline[k].extend(0.0)).to_vec();
+    let face: Vec<_> = (0..n / 2).map(chord).collect();
     let rim = [[1.0, -HALF_THICKNESS], [1.0, HALF_THICKNESS]];
-    Solid::wheel(&outline, 0.0, &[[1.0, 0.0], [0.0, 0.0]], false)
-        .and(Solid::wheel(&outline, 0.0, &rim, false))
+    Solid::sheet(&face).and(Solid::wheel(&outline, 0.0, &rim, false))
+}
+
+/// A rectangle with rounded corners, from the end of its right side on.
+fn outline(half: Vec2, radius: f32) -> Vec<Vec2> {
+    const STEPS: u32 = 8;
+    let corners = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)];
+    let corner = |(turns, side): (usize, (f32, f32))| {
+        let middle = (half - radius) * Vec2::from(side);
+        (0..=STEPS).map(move |step| {
+            middle + direction((turns as f32 + step as f32 / STEPS as f32) * 0.25) * radius
+        })
+    };
+    corners.into_iter().enumerate().flat_map(corner).collect()
 }
 
 /// Where pane `i` stands: turned by turns to the left and to the right, so that
