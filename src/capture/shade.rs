@@ -15,6 +15,10 @@ const FILL: Vec3 = Vec3::new(-0.75, 0.10, 0.65);
 const FILL_STRENGTH: f32 = 0.15;
 const AMBIENT: f32 = 0.10;
 
+/// What is less opaque than half a step of a 16-bit texture is the tail of a
+/// filter, not a surface: it is not recorded.
+const LEAST_ALPHA: f32 = 0.5 / 65535.0;
+
 /// Shades fragments of a scene.
 pub(crate) struct Shader<'a> {
     scene: &'a Scene,
@@ -77,8 +81,8 @@ impl<'a> Shader<'a> {
     }
 
     /// Linear colour and alpha of a fragment of `triangle` where its vertices
-    /// have these weights; `None` where there is nothing: an alpha of 0, or cut
-    /// out by a mask.
+    /// have these weights; `None` where there is nothing: an alpha of 0 or next to
+    /// it, or cut out by a mask.
     pub fn shade(&self, triangle: &Triangle, weights: &Weights) -> Option<([f32; 3], f32)> {
         let material = self.material(triangle.material);
         let [a, b, c] = &triangle.vertices;
@@ -118,7 +122,7 @@ impl<'a> Shader<'a> {
             alpha *= 1.0 - material.transmission.clamp(0.0, 1.0) * tint.clamp(0.0, 1.0);
         }
         let alpha = alpha.clamp(0.0, 1.0);
-        if alpha.is_nan() || alpha == 0.0 {
+        if alpha.is_nan() || alpha < LEAST_ALPHA {
             return None;
         }
 
