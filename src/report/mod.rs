@@ -6,11 +6,17 @@ mod results;
 pub use montage::{Panel, montage};
 pub use results::{FIGURES, Figure, figures, results};
 
-/// A Markdown table; the first column to the left, the others to the right.
+/// A Markdown table; columns of numbers stand to the right.
 pub fn markdown_table(header: &[&str], rows: &[Vec<String>]) -> String {
-    let mut text = format!("| {} |\n|---", header.join(" | "));
-    text.push_str(&"|---:".repeat(header.len().saturating_sub(1)));
-    text.push_str("|\n");
+    let number = |text: &String| {
+        text.is_empty() || text.starts_with(|c: char| c.is_ascii_digit() || "+-−—".contains(c))
+    };
+    let mut text = format!("| {} |\n|", header.join(" | "));
+    for column in 0..header.len() {
+        let right = rows.iter().all(|row| row.get(column).is_none_or(number));
+        text.push_str(if right { "---:|" } else { "---|" });
+    }
+    text.push('\n');
     for row in rows {
         text.push_str(&format!("| {} |\n", row.join(" | ")));
     }
@@ -21,7 +27,7 @@ pub fn markdown_table(header: &[&str], rows: &[Vec<String>]) -> String {
 mod tests {
     #[test]
     fn a_table_has_its_rule() {
-        let table = super::markdown_table(&["a", "b"], &[vec!["1".into(), "2".into()]]);
-        assert_eq!(table, "| a | b |\n|---|---:|\n| 1 | 2 |\n");
+        let table = super::markdown_table(&["a", "b"], &[vec!["x1".into(), "2".into()]]);
+        assert_eq!(table, "| a | b |\n|---|---:|\n| x1 | 2 |\n");
     }
 }

@@ -51,6 +51,8 @@ pub struct Publications {
     pub pixel_orders: Vec<RowDifference>,
     /// Noise of figure 1's ramps, averaged over blocks of pixels.
     pub dithering: Vec<Dithering>,
+    /// The built-in scenes, composited exactly.
+    pub gallery: Vec<(String, Picture)>,
     /// Pictures by name.
     pub pictures: Vec<(&'static str, Picture)>,
 }
@@ -225,6 +227,7 @@ pub fn reproduce(
         means: Vec::new(),
         pixel_orders: pixel_orders(effort)?,
         dithering: Vec::new(),
+        gallery: gallery()?,
         pictures: Vec::new(),
     };
     for spec in SCENES {
@@ -449,7 +452,14 @@ fn far_samples() -> Result<Vec<FarSamples>> {
 }
 
 fn pixel_orders(effort: Effort) -> Result<Vec<RowDifference>> {
-    let specs = ["lk", "lk:pixel-order=morton", "lk:pixel-order=scanline", "lk:reference=white"];
+    let specs = [
+        "lk",
+        "lk:pixel-order=morton",
+        "lk:pixel-order=scanline",
+        "lk:reference=white",
+        "lk:reference=radical-inverse",
+        "lk:pixel-order=morton,reference=radical-inverse",
+    ];
     let mut list = Vec::new();
     for spec in specs {
         let (mut sum, mut count) = (0.0, 0.0);
@@ -470,6 +480,24 @@ fn pixel_orders(effort: Effort) -> Result<Vec<RowDifference>> {
         list.push(RowDifference { design: spec.to_string(), difference: f64::sqrt(sum / count) });
     }
     Ok(list)
+}
+
+/// Every built-in scene that looks like something, small.
+fn gallery() -> Result<Vec<(String, Picture)>> {
+    const SIDE: u32 = 300;
+    let scenes = scene::builtin::BUILTINS.iter().filter(|b| b.name != "layers");
+    scenes
+        .map(|builtin| {
+            let options = CaptureOptions {
+                width: SIDE,
+                height: SIDE,
+                samples: 16,
+                ..CaptureOptions::default()
+            };
+            let trace = capture(&format!("builtin:{}", builtin.name), &options, false)?;
+            Ok((format!("`{}`", builtin.name), replay("exact", &trace, 16, 0)?.picture))
+        })
+        .collect()
 }
 
 /// The picture averaged over blocks of `side` × `side` pixels.

@@ -1,0 +1,152 @@
+//! The traces in `traces/`, and the pictures that designs make of them.
+//!
+//! Each trace is captured anew and must have the content hash that stands in
+//! `traces/README.md`; each design must give the pictures whose hashes stand in
+//! `traces/golden.txt`. To accept a change that is meant:
+//! `cargo test write_golden -- --ignored`, and say in the commit why.
+
+use std::fmt::Write;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use screendoor::capture::{Capture, CaptureOptions, Order};
+use screendoor::trace::{Compression, Trace, TraceWriter, WriteOptions};
+
+use crate::util::{all_variants, picture};
+
+/// A trace of the folder: its name, its scene, and how it is captured.
+struct Golden {
+    name: &'static str,
+    scene: &'static str,
+    order: Order,
+}
+
+const SIDE: u32 = 64;
+
+const TRACES: [Golden; 8] = [
+    Golden { name: "ramps", scene: "builtin:ramps", order: Order::Api },
+    Golden { name: "layers", scene: "builtin:layers:alpha=0.3,coloured=true", order: Order::Api },
+    Golden { name: "engine", scene: "builtin:engine:rows=1,detail=2", order: Order::Api },
+    Golden { name: "cloth", scene: "builtin:cloth:sheets=3,cells=24", order: Order::Random },
+    Golden { name: "hair", scene: "builtin:hair:strands=300", order: Order::Api },
+    Golden { name: "smoke", scene: "builtin:smoke:puffs=300", order: Order::FarToNear },
+    Golden { name: "foliage", scene: "builtin:foliage:cards=500", order: Order::NearToFar },
+    Golden { name: "glass", scene: "builtin:glass", order: Order::Api },
+];
+
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("traces")
+}
+
+impl Golden {
+    fn path(&self) -> PathBuf {
+        folder().join(format!("{}.arrow", self.name))
+    }
+
+    /// Captures the scene anew: the file's bytes and the content hash.
+    fn capture(&self) -> (Vec<u8>, String) {
+        let scene = screendoor::scene::load(self.scene).unwrap();
+        let options = CaptureOptions {
+            width: SIDE,
+            height: SIDE,
+            order: self.order,
+            ..CaptureOptions::default()
+        };
+        let capture = Capture::new(&scene, &options).unwrap();
+        let write = WriteOptions { compression: Compression::Zstd, ..WriteOptions::default() };
+        let mut writer =
+            TraceWriter::new(Vec::new(), self.name, capture.header().clone(), write).unwrap();
+        capture.draw(&mut writer, |_, _| ()).unwrap();
+        let (bytes, written) = writer.finish().unwrap();
+        (bytes, written.content)
+    }
+
+    fn command(&self) -> String {
+        let order = match self.order {
+            Order::Api => "",
+            Order::Random => " --order random",
+            Order::NearToFar => " --order near-to-far",
+            Order::FarToNear => " --order far-to-near",
+        };
+        format!(
+            "screendoor capture {} -o {}.arrow --size {SIDE}x{SIDE} --compress zstd{order}",
+            self.scene, self.name
+        )
+    }
+}
+
+fn readme(contents: &[(u64, String)]) -> String {
+    let mut text = String::from(
+        "# Traces\n\n\
+         Small traces of the built-in scenes, 64 nested samples per pixel, for tests and benches. Each\n\
+         is made by the command beside it, and a test makes it again and compares the content hash.\n\
+         `golden.txt` holds the hashes of the pictures that the designs make of them; `hostile/`\n\
+         holds files that must be refused.\n\n\
+         | trace | fragments | content hash | made by |\n|---|---:|---|---|\n",
+    );
+    for (golden, (rows, content)) in TRACES.iter().zip(contents) {
+        let _ = writeln!(
+            text,
+            "| {}.arrow | {rows} | `{content}` | `{}` |",
+            golden.name,
+            golden.command()
+        );
+    }
+    text
+}
+
+/// The hashes of all pictures: trace, design, samples, seed, hash.
+fn pictures() -> String {
+    let mut text = String::new();
+    for golden in &TRACES {
+        let trace = Trace::open(golden.path()).unwrap();
+        for design in all_variants() {
+            let label = design.label();
+            let counts: &[u32] = if label.contains(':') { &[8] } else { &[1, 4, 8, 16, 64] };
+            for samples in counts {
+                let hash = picture(&design, &trace, *samples, 1).hash();
+                let _ = writeln!(text, "{} {label} {samples} 1 {hash}", golden.name);
+            }
+        }
+    }
+    text
+}
+
+fn on_disk() -> Vec<(u64, String)> {
+    let summary = |golden: &Golden| {
+        let trace = Trace::open(golden.path()).unwrap();
+        (trace.rows(), trace.content().unwrap().to_string())
+    };
+    TRACES.iter().map(summary).collect()
+}
+
+#[test]
+fn the_traces_are_what_their_commands_make() {
+    let found = on_disk();
+    assert_eq!(fs::read_to_string(folder().join("README.md")).unwrap(), readme(&found));
+    for (golden, (_, content)) in TRACES.iter().zip(found) {
+        assert_eq!(golden.capture().1, content, "{}", golden.name);
+        let trace = Trace::open(golden.path()).unwrap();
+        assert_eq!(trace.verify(|_| ()).unwrap(), content);
+    }
+}
+
+#[test]
+fn the_pictures_are_the_golden_ones() {
+    let expected = fs::read_to_string(folder().join("golden.txt")).unwrap();
+    let found = pictures();
+    for (expected, found) in expected.lines().zip(found.lines()) {
+        assert_eq!(found, expected);
+    }
+    assert_eq!(expected.lines().count(), found.lines().count());
+}
+
+#[test]
+#[ignore = "writes the traces and golden.txt"]
+fn write_golden() {
+    for golden in &TRACES {
+        fs::write(golden.path(), golden.capture().0).unwrap();
+    }
+    fs::write(folder().join("README.md"), readme(&on_disk())).unwrap();
+    fs::write(folder().join("golden.txt"), pictures()).unwrap();
+}
