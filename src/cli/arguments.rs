@@ -1,12 +1,15 @@
 //! Arguments that several commands share, and how they are read.
 
+use std::path::PathBuf;
+
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
+use crate::cli::console::Console;
 use crate::design::{Configured, configure};
 use crate::error::Result;
 use crate::param::{Options, parse_setting};
-use crate::trace::SamplePattern;
+use crate::trace::{SamplePattern, Trace};
 
 /// A parser for an enumeration of [`Options`]: the names and helps are its own.
 pub(super) fn option<C: Options + Send + Sync>() -> impl TypedValueParser<Value = C> {
@@ -48,7 +51,7 @@ fn setting(text: &str) -> Result<(String, String), String> {
 
 /// Which design, with which parameters.
 #[derive(Debug, Args)]
-pub(super) struct DesignArguments {
+struct DesignArguments {
     /// The design: NAME, or NAME:parameter=value,… ('screendoor designs' lists them)
     #[arg(long, short, default_value = "lk", value_name = "DESIGN")]
     design: String,
@@ -58,8 +61,39 @@ pub(super) struct DesignArguments {
 }
 
 impl DesignArguments {
-    pub fn configure(&self) -> Result<Configured> {
+    fn configure(&self) -> Result<Configured> {
         configure(&self.design, &self.set)
+    }
+}
+
+/// What is replayed: a trace, a design, a sample count, a seed.
+#[derive(Debug, Args)]
+pub(super) struct RunArguments {
+    /// The trace
+    trace: PathBuf,
+    #[command(flatten)]
+    design: DesignArguments,
+    /// Samples per pixel; the trace's own count where not given
+    #[arg(long, value_name = "N", value_parser = samples)]
+    samples: Option<u32>,
+    /// The run's seed: one seed names one picture
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    pub seed: u32,
+}
+
+impl RunArguments {
+    /// The design, the open trace, and the sample count, each checked.
+    pub fn open(&self, console: &Console) -> Result<(Configured, Trace, u32)> {
+        let design = self.design.configure()?;
+        let trace = Trace::open(&self.trace)?;
+        if !trace.is_sealed() {
+            console
+                .warn(&format!("{}: written without checksums by another program", trace.place()));
+        }
+        let pattern = &trace.header().pattern;
+        let samples = self.samples.unwrap_or(pattern.samples());
+        pattern.prefix(samples)?;
+        Ok((design, trace, samples))
     }
 }
 

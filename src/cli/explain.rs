@@ -1,32 +1,22 @@
 //! `screendoor explain`.
 
-use std::path::PathBuf;
-
 use clap::Args;
 
-use crate::cli::arguments::{DesignArguments, numbers, samples};
+use crate::cli::arguments::{RunArguments, numbers};
 use crate::cli::console::Console;
 use crate::error::{Error, Result};
 use crate::param::Values;
 use crate::rop::{Contents, Explanation, Site, Step};
-use crate::trace::{SampleMask, Trace, Unorm32};
+use crate::trace::{SampleMask, Unorm32};
 
 /// Show what a design does at one pixel, fragment by fragment
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// The trace
-    trace: PathBuf,
+    #[command(flatten)]
+    run: RunArguments,
     /// The pixel: column and row from the top left
     #[arg(long, value_name = "X,Y", value_parser = numbers::<2>)]
     pixel: [f64; 2],
-    #[command(flatten)]
-    design: DesignArguments,
-    /// Samples per pixel; the trace's own count where not given
-    #[arg(long, value_name = "N", value_parser = samples)]
-    samples: Option<u32>,
-    /// The run's seed
-    #[arg(long, default_value_t = 0, value_name = "N")]
-    seed: u32,
     /// Show only the last N fragments
     #[arg(long, value_name = "N")]
     last: Option<usize>,
@@ -48,8 +38,8 @@ struct Document<'a> {
 }
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
-    let design = arguments.design.configure()?;
-    let trace = Trace::open(&arguments.trace)?;
+    let (design, trace, samples) = arguments.run.open(console)?;
+    let seed = arguments.run.seed;
     let coordinate = |v: f64| {
         let whole = v.fract() == 0.0 && (0.0..65536.0).contains(&v);
         whole.then_some(v as u16).ok_or_else(|| {
@@ -57,15 +47,13 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         })
     };
     let site = Site { x: coordinate(arguments.pixel[0])?, y: coordinate(arguments.pixel[1])? };
-    let samples = arguments.samples.unwrap_or(trace.header().pattern.samples());
     let progress = console.progress("searching", "fragments");
     let report = |done, total| progress.set(done, total);
-    let mut explanation = design.explain(&trace, samples, arguments.seed, site, &report)?;
+    let mut explanation = design.explain(&trace, samples, seed, site, &report)?;
     drop(progress);
     let all = explanation.steps.len();
-    if let Some(last) = arguments.last {
-        explanation.steps.drain(..all.saturating_sub(last));
-    }
+    let left_out = arguments.last.map_or(0, |last| all.saturating_sub(last));
+    let before = explanation.steps.drain(..left_out).next_back().map(|step| step.contents);
     if let Some(path) = &arguments.json {
         let document = Document {
             trace: trace.place(),
@@ -73,7 +61,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
             parameters: design.values(),
             pixel: [site.x, site.y],
             samples,
-            seed: arguments.seed,
+            seed,
             explanation: &explanation,
         };
         return console.json(path, &document);
@@ -84,18 +72,17 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         site.x,
         site.y,
         trace.place(),
-        arguments.seed
+        seed
     ))?;
     if all == 0 {
         console.print(format_args!("no fragment of the trace covers this pixel"))?;
     }
-    if explanation.steps.len() < all {
-        console.print(format_args!("… {} fragments before", all - explanation.steps.len()))?;
+    if left_out > 0 {
+        console.print(format_args!("… {left_out} fragments before"))?;
     }
-    let mut before = explanation.cleared.clone();
+    let mut before = before.unwrap_or_else(|| explanation.cleared.clone());
     for (i, step) in explanation.steps.iter().enumerate() {
-        let number = all - explanation.steps.len() + i + 1;
-        print_step(number, all, step, &before, console)?;
+        print_step(left_out + i + 1, all, step, &before, console)?;
         before = step.contents.clone();
     }
     let [r, g, b] = explanation.colour;
@@ -145,11 +132,11 @@ fn print_step(
     }
     if !record.references.is_empty() {
         let tests = record.references.iter().map(|t| {
-            let sign = if t.passed { "<" } else { ">" };
-            format!("{}:#{}:{:.4}{sign}", t.sample, t.number, t.value)
+            let verdict = if t.passed { "passes" } else { "fails" };
+            format!("{} as #{}: {:.4} {verdict}", t.sample, t.number, t.value)
         });
         let tests: Vec<String> = tests.collect();
-        for (i, few) in tests.chunks(6).enumerate() {
+        for (i, few) in tests.chunks(4).enumerate() {
             let name = if i == 0 { "references" } else { "" };
             line(name, few.join("  "))?;
         }

@@ -6,7 +6,7 @@ use std::time::Instant;
 use clap::Args;
 use serde::Serialize;
 
-use crate::cli::arguments::{DesignArguments, samples};
+use crate::cli::arguments::RunArguments;
 use crate::cli::console::{Console, grouped};
 use crate::design::{Configured, REFERENCE, configure};
 use crate::error::{Error, Result};
@@ -19,16 +19,8 @@ use crate::trace::Trace;
 /// Replay a trace through a design: a picture, its error, what the ROP did
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// The trace
-    trace: PathBuf,
     #[command(flatten)]
-    design: DesignArguments,
-    /// Samples per pixel; the trace's own count where not given
-    #[arg(long, value_name = "N", value_parser = samples)]
-    samples: Option<u32>,
-    /// The run's seed: one seed names one picture
-    #[arg(long, default_value_t = 0, value_name = "N")]
-    seed: u32,
+    run: RunArguments,
     /// Replay this many seeds, from --seed on, and tell variance from bias;
     /// implies --exact
     #[arg(long, default_value_t = 1, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=100_000))]
@@ -79,15 +71,11 @@ struct ErrorsByRegion {
 }
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
-    let design = arguments.design.configure()?;
     for path in &arguments.output {
         check_ending(path)?;
     }
-    let trace = Trace::open(&arguments.trace)?;
-    if !trace.is_sealed() {
-        console.warn(&format!("{}: written without checksums by another program", trace.place()));
-    }
-    let samples = arguments.samples.unwrap_or(trace.header().pattern.samples());
+    let (design, trace, samples) = arguments.run.open(console)?;
+    let seed = arguments.run.seed;
     let progress = console.progress("replaying", "fragments");
     let report = |done, total| progress.set(done, total);
     let options = ReplayOptions {
@@ -96,11 +84,9 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         memory: arguments.memory << 20,
         progress: &report,
     };
-    // Wrong requests first, before anything takes long.
-    trace.header().pattern.prefix(samples)?;
 
     let start = Instant::now();
-    let first = design.replay(&trace, samples, arguments.seed, &options)?;
+    let first = design.replay(&trace, samples, seed, &options)?;
     let seconds = start.elapsed().as_secs_f64();
 
     let reference = if arguments.exact || arguments.seeds > 1 {
@@ -114,7 +100,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         Some(reference) => {
             let pictures = (1..arguments.seeds).map(|i| {
                 progress.name(&format!("seed {} of {}", i + 1, arguments.seeds));
-                let seed = arguments.seed.wrapping_add(i);
+                let seed = seed.wrapping_add(i);
                 let plain = ReplayOptions { count_events: false, ..options };
                 Ok(design.replay(&trace, samples, seed, &plain)?.picture)
             });
@@ -136,7 +122,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
             parameters: design.values(),
             promises: design.promises(),
             samples,
-            seed: arguments.seed,
+            seed,
             picture: first.picture.hash(),
             seconds,
             fragments_per_second,
@@ -151,7 +137,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     console.print(format_args!(
         "{} at {samples} samples, seed {}: {}",
         design.label(),
-        arguments.seed,
+        seed,
         trace.place()
     ))?;
     console.print(format_args!(

@@ -7,7 +7,7 @@ use crate::random::hash;
 use crate::resolve::box_filter;
 use crate::rop::{
     Blueprint, Contents, Design, Family, Frame, Info, Probe, Promises, Samples, Site, StateBits,
-    Threshold, depth_bits, sample_depths,
+    Threshold, depth_bits,
 };
 use crate::trace::{Fragment, SampleMask, Unorm32};
 
@@ -140,7 +140,7 @@ impl<const N: usize> Design for EndertonAt<N> {
         fragment: &Fragment,
         probe: &mut P,
     ) {
-        let z: [Unorm32; N] = sample_depths(fragment, &self.frame, self.depth_bits);
+        let z: [Unorm32; N] = self.frame.depths(fragment, self.depth_bits);
         let passed = samples.depth_test(fragment.coverage, &z);
         probe.passed(passed);
         probe.state(self.depth_bits * fragment.coverage.count(), 0);

@@ -10,7 +10,7 @@ use crate::resolve::box_filter;
 use crate::rop::{
     Blueprint, Contents, Design, Family, Frame, Info, PixelIndex, PixelOrder, Probe, Promises,
     Reference, ReferenceKey, SampleList, Samples, Site, StateBits, SurfaceRule, SurfaceTracker,
-    Threshold, Tracked, depth_bits, in_sample_order, sample_depths, sort_by_stored_depth,
+    Threshold, Tracked, depth_bits, in_sample_order, sort_by_stored_depth,
 };
 use crate::trace::{Fragment, SampleMask, Unorm32};
 
@@ -147,7 +147,7 @@ impl<const N: usize> Design for LaineKarrasAt<N> {
         probe: &mut P,
     ) {
         // Depth and opacity are compared as integers, not as the figure's reals.
-        let z: [Unorm32; N] = sample_depths(fragment, &self.frame, self.depth_bits);
+        let z: [Unorm32; N] = self.frame.depths(fragment, self.depth_bits);
         let opacity = Threshold::of(fragment.alpha);
 
         // 1–3: drop the samples that fail the depth test. With `compact` off that

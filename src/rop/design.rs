@@ -9,7 +9,7 @@ use crate::param::{Param, Values};
 use crate::rop::event::Probe;
 use crate::rop::samples::SampleContents;
 use crate::tile::TileGrid;
-use crate::trace::{ColourFormat, Fragment, Trace};
+use crate::trace::{ColourFormat, Fragment, Trace, Unorm32};
 
 /// What a design knows of the frame it draws.
 #[derive(Clone, Debug)]
@@ -48,6 +48,15 @@ impl Frame {
     /// Samples per pixel.
     pub fn samples(&self) -> u32 {
         self.positions.len() as u32
+    }
+
+    /// A fragment's depth at each of its pixel's samples, kept to `bits` bits.
+    ///
+    /// # Panics
+    /// Where `N` is not the frame's sample count.
+    #[inline]
+    pub fn depths<const N: usize>(&self, f: &Fragment, bits: u32) -> [Unorm32; N] {
+        std::array::from_fn(|s| f.depth.at(self.positions[s]).narrowed(bits))
     }
 }
 

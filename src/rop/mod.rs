@@ -17,7 +17,5 @@ pub use opacity::Threshold;
 pub use pixel_order::{PixelIndex, PixelOrder};
 pub use reference_value::{Reference, ReferenceKey, scramble_lk2011};
 pub use replay::{Explanation, ReplayOptions, Replayed, Step, draw_pixel, explain, replay};
-pub use samples::{
-    SampleContents, SampleList, Samples, in_sample_order, sample_depths, sort_by_stored_depth,
-};
+pub use samples::{SampleContents, SampleList, Samples, in_sample_order, sort_by_stored_depth};
 pub use surface::{CoveredMask, SurfaceRule, SurfaceTracker, Tracked};

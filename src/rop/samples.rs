@@ -3,8 +3,7 @@
 use arrayvec::ArrayVec;
 use serde::Serialize;
 
-use crate::rop::design::Frame;
-use crate::trace::{Fragment, SampleMask, Unorm32};
+use crate::trace::{SampleMask, Unorm32};
 
 /// Depth and colour of a pixel's `N` samples.
 #[derive(Clone, Debug)]
@@ -48,12 +47,6 @@ pub struct SampleContents {
     pub depth: Unorm32,
     /// Its linear colour.
     pub colour: [f32; 3],
-}
-
-/// A fragment's depth at each of its pixel's samples, kept to `bits` bits.
-#[inline]
-pub fn sample_depths<const N: usize>(f: &Fragment, frame: &Frame, bits: u32) -> [Unorm32; N] {
-    std::array::from_fn(|s| f.depth.at(frame.positions[s]).narrowed(bits))
 }
 
 /// Samples in the order in which they are numbered.

@@ -176,6 +176,18 @@ impl Default for View {
     }
 }
 
+impl View {
+    /// Straight from the front along parallel lines, onto a square from −1 to 1,
+    /// before black: for pictures rather than things.
+    pub const FRONT: View = View {
+        yaw: 0.0,
+        pitch: 0.0,
+        orthographic: true,
+        background: [0.0; 3],
+        frame: Some([1.0, 1.0]),
+    };
+}
+
 impl Scene {
     /// How many triangles it draws.
     pub fn triangle_count(&self) -> usize {

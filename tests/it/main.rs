@@ -6,6 +6,7 @@ mod golden;
 mod guarantees;
 mod hostile;
 mod layering;
+mod models;
 mod python;
 mod trace_file;
 mod unbiased;

@@ -23,16 +23,7 @@ pub(super) const SCENE: Builtin = Builtin {
 
 fn build(values: &Values) -> Scene {
     let count = values.integer("count");
-    let mut scene = Scene {
-        view: View {
-            yaw: 0.0,
-            pitch: 0.0,
-            orthographic: true,
-            background: [0.0; 3],
-            frame: Some([1.0, 1.0]),
-        },
-        ..Scene::default()
-    };
+    let mut scene = Scene { view: View::FRONT, ..Scene::default() };
     for i in 0..count {
         let place = if values.flag("near-first") { count - 1 - i } else { i };
         let mut random = Stream::new([0x1a7e5, seed(values), place as u32]);

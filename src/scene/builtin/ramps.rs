@@ -21,13 +21,7 @@ fn build(_: &Values) -> Scene {
             unlit: true,
             ..Material::default()
         }],
-        view: View {
-            yaw: 0.0,
-            pitch: 0.0,
-            orthographic: true,
-            background: [0.0; 3],
-            frame: Some([1.0, 1.0]),
-        },
+        view: View::FRONT,
         ..Scene::default()
     };
     // Three bands across the frame; the edges of the last band's five quads slant,

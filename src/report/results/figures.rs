@@ -1,0 +1,149 @@
+//! The document's pictures.
+
+use std::fmt::Write;
+
+use crate::picture::Picture;
+use crate::report::{Panel, montage};
+use crate::study::publications::Publications;
+
+/// A figure of the document: its file and what it is made of.
+#[derive(Clone, Copy, Debug)]
+pub struct Figure {
+    /// The file's name, without its ending.
+    pub file: &'static str,
+    /// Names of its panels among the publications' pictures.
+    pub panels: &'static [&'static str],
+    /// Panels in a row.
+    columns: u32,
+    /// Magnification of each pixel.
+    enlarge: u32,
+    /// The panels' part that is shown, in sixteenths of their side: left, top,
+    /// side; all of it where not given.
+    part: Option<[u32; 3]>,
+    caption: &'static str,
+}
+
+/// All figures.
+pub const FIGURES: &[Figure] = &[
+    Figure {
+        file: "figure-1",
+        panels: &["figure-1-enderton", "figure-1-lk"],
+        columns: 2,
+        enlarge: 2,
+        part: None,
+        caption: "LK figure 1, left of each pair: `builtin:ramps` at 16 samples, `enderton` \
+                  and `lk`. From the top: alpha from 0 to 1; alpha 0.61; alpha 0.75 drawn as five \
+                  quads, whose edges show on the left and leave no trace on the right.",
+    },
+    Figure {
+        file: "figure-1-cloth",
+        panels: &["figure-1-cloth-enderton", "figure-1-cloth-lk"],
+        columns: 2,
+        enlarge: 3,
+        part: None,
+        caption: "LK figure 1, right of each pair: a detail of `builtin:cloth` at 64 samples, \
+                  `enderton` and `lk`.",
+    },
+    Figure {
+        file: "figure-3",
+        panels: &[
+            "figure-3-lk2011",
+            "figure-3-sobol",
+            "figure-3-white",
+            "figure-3-lk2011-static",
+            "figure-3-sobol-static",
+            "figure-3-radical-inverse",
+        ],
+        columns: 3,
+        enlarge: 2,
+        part: None,
+        caption: "LK figure 3: eight white layers of alpha 0.1 at 8 samples. Upper row, samples \
+                  compacted and sorted: `lk2011`, `sobol`, `white`. Lower row, reference values \
+                  fixed to samples as in section 3 of the paper (`sort=false,compact=false`): \
+                  `lk2011`, `sobol`, `radical-inverse`. With fixed values the Sobol' sequence \
+                  leaves the correlations of the paper's figure 3b, and the radical inverse lets \
+                  the nearest layer hide the others; the hash leaves neither.",
+    },
+    Figure {
+        file: "figure-6",
+        panels: &["figure-6-unsorted", "figure-6-sorted"],
+        columns: 2,
+        enlarge: 3,
+        part: None,
+        caption: "LK figure 6: a detail of `builtin:cloth`, triangles in random order, 16 \
+                  samples, without and with the sort.",
+    },
+    Figure {
+        file: "figure-9",
+        panels: &["figure-9-enderton", "figure-9-lk"],
+        columns: 2,
+        enlarge: 1,
+        part: Some([4, 4, 8]),
+        caption: "LK figure 9: a detail of `builtin:engine`, white, alpha 0.3, 16 samples, \
+                  `enderton` and `lk`.",
+    },
+    Figure {
+        file: "figure-10",
+        panels: &["figure-10-enderton", "figure-10-lk"],
+        columns: 2,
+        enlarge: 1,
+        part: Some([4, 4, 8]),
+        caption: "LK figure 10: a detail of `builtin:cloth`, alpha 0.4, 16 samples, `enderton` \
+                  and `lk`.",
+    },
+];
+
+/// The file of the picture of all built-in scenes.
+const GALLERY: &str = "scenes";
+
+/// The document's figures: file names and pictures.
+pub fn figures(publications: &Publications) -> Vec<(&'static str, Picture)> {
+    let scenes: Vec<Panel<'_>> = publications
+        .gallery
+        .iter()
+        .map(|(_, picture)| Panel { picture, crop: None, enlarge: 1 })
+        .collect();
+    let mut list = vec![(GALLERY, montage(&scenes, 4))];
+    list.extend(paper_figures(publications));
+    list
+}
+
+fn paper_figures(publications: &Publications) -> Vec<(&'static str, Picture)> {
+    let find = |name: &str| publications.pictures.iter().find(|(n, _)| *n == name);
+    FIGURES
+        .iter()
+        .filter_map(|figure| {
+            let pictures: Option<Vec<&Picture>> =
+                figure.panels.iter().map(|n| find(n).map(|(_, p)| p)).collect();
+            let panel = |picture| {
+                let crop = figure.part.map(|part| {
+                    let side = Picture::width(picture);
+                    let [left, top, size] = part.map(|p| p * side / 16);
+                    [left, top, size, size]
+                });
+                Panel { picture, crop, enlarge: figure.enlarge }
+            };
+            let panels: Vec<Panel<'_>> = pictures?.into_iter().map(panel).collect();
+            Some((figure.file, montage(&panels, figure.columns)))
+        })
+        .collect()
+}
+
+pub(super) fn pictures(text: &mut String, p: &Publications, folder: &str) {
+    let scenes: Vec<&str> = p.gallery.iter().map(|(name, _)| name.as_str()).collect();
+    let _ = writeln!(
+        text,
+        "## Pictures\n\n![{GALLERY}]({folder}/{GALLERY}.png)\n\n\
+         The built-in scenes, composited exactly: {}.\n",
+        scenes.join(", ")
+    );
+    let there: Vec<&str> = p.pictures.iter().map(|(name, _)| *name).collect();
+    for figure in FIGURES.iter().filter(|f| f.panels.iter().all(|n| there.contains(n))) {
+        let _ = writeln!(
+            text,
+            "![{file}]({folder}/{file}.png)\n\n{caption}\n",
+            file = figure.file,
+            caption = figure.caption
+        );
+    }
+}

@@ -1,0 +1,164 @@
+//! `docs/RESULTS.md`: the publications' figures beside ours.
+
+mod figures;
+mod table_1;
+
+use std::fmt::Write;
+
+pub use figures::{FIGURES, Figure, figures};
+
+use crate::metrics::Estimate;
+use crate::report::markdown_table;
+use crate::study::publications::{BLOCKS, Publications};
+
+/// The document. `figure_folder` is where the figures lie, as seen from it.
+pub fn results(p: &Publications, figure_folder: &str) -> String {
+    let mut text = String::new();
+    preamble(&mut text, p);
+    for (i, table) in p.table_1.iter().enumerate() {
+        table_1::table_1(&mut text, i, table);
+    }
+    for missing in &p.missing {
+        let _ = writeln!(text, "`{missing}`: the model was not given, so there is no table.\n");
+    }
+    table_1::account(&mut text, p);
+    expectations(&mut text, p);
+    figure_5(&mut text, p);
+    figures::pictures(&mut text, p, figure_folder);
+    text
+}
+
+fn preamble(text: &mut String, p: &Publications) {
+    let _ = writeln!(
+        text,
+        "# Results\n\n\
+         Written by `screendoor reproduce`; nothing here is typed by hand. Errors are in 8-bit \
+         units (1/255 of the range from black to white), on linear values where nothing else is \
+         said. ± and [ ] are 95 % intervals over seeds: Student's t on the mean square, and \
+         for ratios both sides' relative widths in quadrature.\n\n\
+         LK is Laine and Karras, *Stratified Sampling for Stochastic Transparency*, EGSR 2011. \
+         To rerun: `screendoor reproduce --models FOLDER`, where the folder holds the models \
+         named below (without it the built-in scenes are measured).\n\n\
+         ## LK table 1\n\n\
+         RMSE over the covered pixels against the exact picture of all 64 samples, so that \
+         missing antialiasing counts as it does against the paper's reference of thousands of \
+         samples; {} × {} pixels, {} seeds. `naive` is `enderton:mask=naive`, which tests every \
+         sample on its own. The paper's models are not public: ours stand in for them.\n",
+        p.effort.side, p.effort.side, p.effort.seeds
+    );
+}
+
+fn expectations(text: &mut String, p: &Publications) {
+    if p.means.is_empty() {
+        return;
+    }
+    let _ = writeln!(
+        text,
+        "## Is it unbiased?\n\n\
+         Mean of picture minus exact over the covered pixels of the first CLOTH scene at 256 × 256 \
+         pixels, over {} seeds. The paper takes LK figure 7 to be unbiased. It is not quite: \
+         where primitives' edges share pixels in mixed order, chance decides which fragments \
+         belong to one surface. A fragment that covers samples A and B of the current surface's \
+         pixel, of which that surface holds A: if the surface was *written* to A and is nearer, A \
+         fails the depth test, no conflict is seen, and B is numbered into the same surface, with \
+         a reference value complementary to A's low one, thus rather high. If it was not written, \
+         the conflict is seen and B gets a fresh value. On average B passes too rarely. The bias \
+         falls as 1/N and is small beside the noise, yet far outside chance.\n\n\
+         It vanishes when the tracking sees all covered samples, before the depth test \
+         (`track=covered`: a counter of log2(N)+1 bits more per pixel, the same noise), and in \
+         every other variant in which chance does not decide the surface.\n",
+        p.effort.seeds_of_means
+    );
+    let rows: Vec<Vec<String>> = p
+        .means
+        .iter()
+        .map(|m| {
+            let outside = m.mean.low > 0.0 || m.mean.high < 0.0;
+            let sigmas = m.mean.value.abs() / (m.mean.half_width() / 1.96);
+            vec![
+                format!("`{}`", m.design),
+                m.samples.to_string(),
+                format!("{:+.4} ± {:.4}", m.mean.value, m.mean.half_width()),
+                if outside { format!("{sigmas:.1} σ") } else { "within".to_string() },
+                plain(m.rmse),
+                if m.unbiased { "unbiased" } else { "biased" }.to_string(),
+            ]
+        })
+        .collect();
+    let header = ["design", "samples", "mean error", "off 0", "RMSE", "declared"];
+    text.push_str(&markdown_table(&header, &rows));
+    let _ = writeln!(
+        text,
+        "\n('within' is within the 95 % interval; one of twenty is expected outside by chance.)\n"
+    );
+}
+
+fn figure_5(text: &mut String, p: &Publications) {
+    let _ = writeln!(
+        text,
+        "## LK figure 5\n\n\
+         Samples that a surface of alpha 0.5 keeps under another one of alpha 0.5, of 16: fewest \
+         and most over 64 × 64 pixels. The right number is 4.\n"
+    );
+    let rows: Vec<Vec<String>> = p
+        .far_samples
+        .iter()
+        .map(|f| {
+            let order = if f.near_first { "near to far" } else { "far to near" };
+            vec![
+                if f.part.is_empty() { String::new() } else { format!("({})", f.part) },
+                format!("`{}`", f.design),
+                order.to_string(),
+                format!("{} to {}", f.range[0], f.range[1]),
+            ]
+        })
+        .collect();
+    text.push_str(&markdown_table(&["part", "design", "drawn", "samples"], &rows));
+    let _ = writeln!(
+        text,
+        "\n## Pixel orders\n\n\
+         LK section 3.1: a Morton curve gives even and odd rows different expectations. Difference \
+         of the means of even and odd rows of one surface, alpha 0.1 to 0.6, 4 samples, 128 × 128 \
+         pixels, root mean square over seeds and alphas, in 8-bit units. The effect is plain in \
+         the unscrambled sequence; figure 4's hash leaves little of it:\n"
+    );
+    let rows: Vec<Vec<String>> = p
+        .pixel_orders
+        .iter()
+        .map(|o| vec![format!("`{}`", o.design), format!("{:.3}", o.difference)])
+        .collect();
+    text.push_str(&markdown_table(&["design", "difference"], &rows));
+    let _ = writeln!(
+        text,
+        "\n## Dithering\n\n\
+         The noise of figure 1 averaged over blocks of pixels: RMSE in 8-bit units. Noise without \
+         spatial stratification halves as the block's side doubles; dithered noise falls faster.\n"
+    );
+    let mut header = vec!["design".to_string()];
+    header.extend(BLOCKS.iter().map(|b| format!("{b}×{b}")));
+    let rows: Vec<Vec<String>> = p
+        .dithering
+        .iter()
+        .map(|d| {
+            let mut row = vec![format!("`{}`", d.design)];
+            row.extend(d.rmse.iter().map(|e| format!("{e:.2}")));
+            row
+        })
+        .collect();
+    let header: Vec<&str> = header.iter().map(String::as_str).collect();
+    text.push_str(&markdown_table(&header, &rows));
+    text.push('\n');
+}
+
+fn plain(e: Estimate) -> String {
+    format!("{:.2} ± {:.2}", e.value, e.half_width())
+}
+
+fn ratio(a: Estimate, b: Estimate) -> String {
+    let r = a.ratio(b);
+    if !r.high.is_finite() {
+        // The runs scatter so much that the interval reaches 0.
+        return format!("{:.3} [?]", r.value);
+    }
+    format!("{:.3} [{:.3}, {:.3}]", r.value, r.low, r.high)
+}

@@ -1,0 +1,246 @@
+//! LK table 1 on scenes that we have, and how its ratio depends on what is seen.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use crate::capture::{CameraOptions, CaptureOptions, Faces, Order};
+use crate::error::Result;
+use crate::metrics::{Estimate, PixelClasses, errors};
+use crate::study::publications::{Effort, MEMORY, capture, designs, replay};
+use crate::study::{Plan, Run, measure};
+use crate::trace::{SampleMask, Statistics, Trace, statistics};
+
+/// Sample counts of LK's table 1.
+pub const COUNTS: [u32; 5] = [4, 8, 16, 32, 64];
+/// The designs of our table: LK's own, the comparison as it describes it, and
+/// sampling without any stratification.
+pub const DESIGNS: [&str; 3] = ["lk", "enderton", "enderton:mask=naive"];
+
+/// A scene of table 1 and how it is captured.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Table1Scene {
+    pub name: &'static str,
+    /// A built-in scene, or a file in the models' folder.
+    pub source: &'static str,
+    origin: &'static str,
+    pub stands_for: Published,
+    alpha: f32,
+    pub white: bool,
+    order: Order,
+}
+
+/// Which column of the published table a scene stands beside.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+pub enum Published {
+    /// White, untextured, α = 0.3.
+    Motor,
+    /// Textured, α = 0.4, triangles in random order.
+    Cloth,
+}
+
+impl Published {
+    /// RMSE of LK and of its comparison at [`COUNTS`] (LK table 1).
+    pub fn rmse(self) -> [[f64; 2]; 5] {
+        match self {
+            Published::Motor => [[29.5, 36.3], [17.9, 25.3], [10.3, 17.2], [6.3, 12.1], [4.0, 8.7]],
+            Published::Cloth => [[17.0, 19.3], [9.7, 12.3], [5.6, 8.4], [3.3, 5.8], [2.0, 4.1]],
+        }
+    }
+}
+
+pub(super) const SCENES: [Table1Scene; 4] = [
+    Table1Scene {
+        name: "cycloidal",
+        source: "cycloidal.glb",
+        origin: "CAD motor, 376 520 triangles (trimesh repository, MIT)",
+        stands_for: Published::Motor,
+        alpha: 0.3,
+        white: true,
+        order: Order::Api,
+    },
+    Table1Scene {
+        name: "engine",
+        source: "builtin:engine",
+        origin: "built-in",
+        stands_for: Published::Motor,
+        alpha: 0.3,
+        white: true,
+        order: Order::Api,
+    },
+    Table1Scene {
+        name: "drape",
+        source: "codimipc_multilayer_drape.obj",
+        origin: "multi-layer garment, 84 159 triangles, untextured (Codim-IPC repository, Apache-2.0)",
+        stands_for: Published::Cloth,
+        alpha: 0.4,
+        white: false,
+        order: Order::Random,
+    },
+    Table1Scene {
+        name: "cloth",
+        source: "builtin:cloth",
+        origin: "built-in",
+        stands_for: Published::Cloth,
+        alpha: 0.4,
+        white: false,
+        order: Order::Random,
+    },
+];
+
+/// Table 1 on one scene.
+#[derive(Clone, Debug, Serialize)]
+pub struct Table1 {
+    /// A short name.
+    pub name: &'static str,
+    /// Where the scene comes from.
+    pub origin: &'static str,
+    /// What it stands beside.
+    pub stands_for: Published,
+    /// Its trace in numbers.
+    pub statistics: Statistics,
+    /// Runs of [`DESIGNS`], sample count after sample count.
+    pub runs: Vec<Run>,
+}
+
+/// One way to see a scene, at 16 samples.
+#[derive(Clone, Debug, Serialize)]
+pub struct Variation {
+    /// Which scene.
+    pub scene: &'static str,
+    /// What differs.
+    pub what: String,
+    /// Fragments per covered pixel.
+    pub fragments_per_pixel: f64,
+    /// Share of the covered pixels that an edge crosses.
+    pub edge_share: f64,
+    /// RMSE over the covered pixels of [`DESIGNS`].
+    pub rmse: [Estimate; 3],
+}
+
+impl Table1Scene {
+    /// How it is captured, in a square frame.
+    pub fn options(&self, side: u32) -> CaptureOptions {
+        CaptureOptions {
+            width: side,
+            height: side,
+            alpha: Some(self.alpha),
+            faces: Faces::Both,
+            order: self.order,
+            ..CaptureOptions::default()
+        }
+    }
+}
+
+impl Table1Scene {
+    /// The scene as it can be loaded; `None` for a model that is not there.
+    pub fn locate(&self, models: Option<&Path>) -> Option<String> {
+        if self.source.starts_with("builtin:") {
+            return Some(self.source.to_string());
+        }
+        let path = models?.join(self.source);
+        path.is_file().then(|| path.display().to_string())
+    }
+
+    /// Runs the table on the scene at `source`.
+    pub fn measure(
+        &self,
+        source: &str,
+        effort: Effort,
+        progress: &mut dyn FnMut(&str, u64, u64),
+    ) -> Result<Table1> {
+        let trace = capture(source, &self.options(effort.side), self.white)?;
+        let plan =
+            Plan { designs: designs(&DESIGNS)?, samples: COUNTS.to_vec(), seeds: effort.seeds };
+        let measured = measure(&trace, &plan, MEMORY, |what, done, total| {
+            progress(&format!("{}: {what}", self.name), done, total);
+        })?;
+        Ok(Table1 {
+            name: self.name,
+            origin: self.origin,
+            stands_for: self.stands_for,
+            statistics: statistics(&trace, |_| ())?,
+            runs: measured.runs.into_iter().map(|m| m.run).collect(),
+        })
+    }
+
+    /// Runs the scene as it is seen otherwise.
+    pub fn vary(
+        &self,
+        source: &str,
+        effort: Effort,
+        progress: &mut dyn FnMut(&str, u64, u64),
+    ) -> Result<Vec<Variation>> {
+        let ways = variations(&self.options(effort.side));
+        let total = ways.len() as u64;
+        let mut list = Vec::new();
+        for (what, options) in ways {
+            progress(&format!("{}: {what}", self.name), list.len() as u64, total);
+            let trace = capture(source, &options, self.white)?;
+            list.push(variation(self.name, what, &trace, effort)?);
+        }
+        Ok(list)
+    }
+}
+
+/// Other ways to see a scene: angles, sizes, orders, backgrounds.
+fn variations(base: &CaptureOptions) -> Vec<(String, CaptureOptions)> {
+    let mut list = vec![("as above".to_string(), base.clone())];
+    for yaw in [120.0, 210.0, 300.0] {
+        let camera = CameraOptions { angle: Some([yaw, 20.0]), ..base.camera };
+        list.push((format!("from {yaw}°"), CaptureOptions { camera, ..base.clone() }));
+    }
+    for part in [2, 4, 8] {
+        let (width, height) = (base.width / part, base.height / part);
+        let what = format!("{width}×{height} pixels");
+        list.push((what, CaptureOptions { width, height, ..base.clone() }));
+    }
+    for (what, order) in [
+        ("triangles in API order", Order::Api),
+        ("triangles in random order", Order::Random),
+        ("near to far", Order::NearToFar),
+        ("far to near", Order::FarToNear),
+    ] {
+        if order != base.order {
+            list.push((what.to_string(), CaptureOptions { order, ..base.clone() }));
+        }
+    }
+    let white = CaptureOptions { background: Some([1.0; 3]), ..base.clone() };
+    list.push(("white background".to_string(), white));
+    list
+}
+
+fn variation(
+    scene: &'static str,
+    what: String,
+    trace: &Trace,
+    effort: Effort,
+) -> Result<Variation> {
+    const SAMPLES: u32 = 16;
+    let classes = PixelClasses::of(trace, SAMPLES)?;
+    let exact = replay("exact", trace, SAMPLES, 0)?.picture;
+    let mut rmse = Vec::new();
+    let mut fragments = 0;
+    for design in DESIGNS {
+        let mut squares = Vec::new();
+        for seed in 0..effort.seeds {
+            let replayed = replay(design, trace, SAMPLES, seed)?;
+            let e = errors(&replayed.picture, &exact, &classes.covered).rmse;
+            squares.push(e * e);
+        }
+        rmse.push(Estimate::of(&squares).sqrt());
+    }
+    for batch in trace.batches() {
+        let mask = SampleMask::first(SAMPLES);
+        let batch = batch?;
+        fragments += (0..batch.len()).filter(|i| !(batch.coverage(*i) & mask).is_empty()).count();
+    }
+    let covered = classes.covered.pixels().max(1) as f64;
+    Ok(Variation {
+        scene,
+        what,
+        fragments_per_pixel: fragments as f64 / covered,
+        edge_share: classes.edges.pixels() as f64 / covered,
+        rmse: rmse.try_into().expect("one a design"),
+    })
+}
