@@ -67,7 +67,7 @@ pub struct Replayed {
 /// Replays `trace` through `design`.
 ///
 /// # Errors
-/// As [`Trace::batch`]; [`Error::Config`] where one pixel's fragments do not fit
+/// As [`Trace::batch`]; [`crate::error::Error::Config`] where one pixel's fragments do not fit
 /// into the memory limit.
 pub fn replay<D: Design>(
     design: &D,
