@@ -5,6 +5,7 @@ mod conformance;
 mod golden;
 mod guarantees;
 mod hostile;
+mod large;
 mod layering;
 mod models;
 mod python;
