@@ -31,8 +31,7 @@ pub(crate) struct Geometry<'a> {
     camera: &'a Camera,
     /// The number of each object's first triangle, and at the end the total.
     starts: Vec<u32>,
-    /// What turns each object's normals into the scene's space.
-    normal_matrices: Vec<DMat3>,
+    places: Vec<Place>,
 }
 
 impl<'a> Geometry<'a> {
@@ -43,8 +42,8 @@ impl<'a> Geometry<'a> {
             let count = scene.shapes[object.shape].triangle_count() as u32;
             starts.push(starts.last().expect("never empty") + count);
         }
-        let normal_matrices = scene.objects.iter().map(|o| normal_matrix(&o.place)).collect();
-        Geometry { scene, camera, starts, normal_matrices }
+        let places = scene.objects.iter().map(|o| Place::new(o.place)).collect();
+        Geometry { scene, camera, starts, places }
     }
 
     /// How many triangles there are.
@@ -59,9 +58,7 @@ impl<'a> Geometry<'a> {
         let local = primitive - self.starts[index];
         let shape = &self.scene.shapes[object.shape];
         let vertices = match shape {
-            Shape::Mesh(mesh) => {
-                mesh_triangle(mesh, local, &object.place, &self.normal_matrices[index])
-            }
+            Shape::Mesh(mesh) => mesh_triangle(mesh, local, &self.places[index]),
             Shape::Strands(strands) => strand_triangle(strands, local, &object.place, self.camera),
             Shape::Particles(particles) => {
                 particle_triangle(particles, local, &object.place, self.camera)
@@ -71,28 +68,43 @@ impl<'a> Geometry<'a> {
     }
 }
 
-/// Normals turn by the inverse transpose; the cofactor matrix is that times the
-/// determinant and exists for flat objects too.
-fn normal_matrix(place: &DAffine3) -> DMat3 {
-    let m = place.matrix3;
-    let sign = if m.determinant() < 0.0 { -1.0 } else { 1.0 };
-    DMat3::from_cols(
-        m.y_axis.cross(m.z_axis) * sign,
-        m.z_axis.cross(m.x_axis) * sign,
-        m.x_axis.cross(m.y_axis) * sign,
-    )
+/// Where an object's mesh stands in the scene.
+struct Place {
+    points: DAffine3,
+    normals: DMat3,
+    /// A mirrored mesh winds the other way round (glTF 2.0, section 3.7.4).
+    mirrored: bool,
 }
 
-fn mesh_triangle(mesh: &Mesh, local: u32, place: &DAffine3, normals: &DMat3) -> [Vertex; 3] {
-    let corners = mesh.triangles[local as usize].map(|i| i as usize);
-    let positions = corners.map(|i| place.transform_point3(mesh.positions[i].as_dvec3()));
+impl Place {
+    fn new(points: DAffine3) -> Self {
+        let m = points.matrix3;
+        let mirrored = m.determinant() < 0.0;
+        let sign = if mirrored { -1.0 } else { 1.0 };
+        // Normals turn by the inverse transpose; the cofactor matrix is that times
+        // the determinant and exists for flat objects too.
+        let normals = DMat3::from_cols(
+            m.y_axis.cross(m.z_axis) * sign,
+            m.z_axis.cross(m.x_axis) * sign,
+            m.x_axis.cross(m.y_axis) * sign,
+        );
+        Place { points, normals, mirrored }
+    }
+}
+
+fn mesh_triangle(mesh: &Mesh, local: u32, place: &Place) -> [Vertex; 3] {
+    let mut corners = mesh.triangles[local as usize].map(|i| i as usize);
+    if place.mirrored {
+        corners.swap(1, 2);
+    }
+    let positions = corners.map(|i| place.points.transform_point3(mesh.positions[i].as_dvec3()));
     let flat = || (positions[1] - positions[0]).cross(positions[2] - positions[0]).as_vec3();
     std::array::from_fn(|k| {
         let i = corners[k];
         Vertex {
             position: positions[k],
             normal: match mesh.normals.get(i) {
-                Some(n) => (*normals * n.as_dvec3()).as_vec3(),
+                Some(n) => (place.normals * n.as_dvec3()).as_vec3(),
                 None => flat(),
             },
             uv: mesh.uvs.get(i).copied().unwrap_or(Vec2::ZERO),
@@ -190,9 +202,18 @@ mod tests {
     }
 
     #[test]
-    fn a_mirrored_object_keeps_its_normals_outside() {
-        let place = DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0));
-        assert_eq!(normal_matrix(&place) * DVec3::X, -DVec3::X);
-        assert_eq!(normal_matrix(&place) * DVec3::Z, DVec3::Z);
+    fn a_mirrored_object_keeps_its_outside() {
+        let place = Place::new(DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0)));
+        assert_eq!(place.normals * DVec3::X, -DVec3::X);
+        assert_eq!(place.normals * DVec3::Z, DVec3::Z);
+        // A triangle that faces +z, without normals of its own.
+        let mesh = Mesh {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
+            triangles: vec![[0, 1, 2]],
+            ..Mesh::default()
+        };
+        let [a, b, c] = mesh_triangle(&mesh, 0, &place);
+        assert!((b.position - a.position).cross(c.position - a.position).z > 0.0);
+        assert_eq!(a.normal, Vec3::Z);
     }
 }

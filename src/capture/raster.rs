@@ -57,8 +57,8 @@ pub(crate) struct Raster<'a> {
     offsets: &'a [[i64; 2]],
     /// Edges opposite to corners 0, 1 and 2.
     edges: [Edge; 3],
-    /// Depth at the frame's top left and its change per sub-pixel step.
-    depth: [f64; 3],
+    /// How the depth changes per sub-pixel step to the right and downwards.
+    depth_slopes: [f64; 2],
     columns: (i64, i64),
     rows: (i64, i64),
 }
@@ -92,7 +92,7 @@ impl<'a> Raster<'a> {
             triangle,
             offsets,
             edges,
-            depth: depth_plane(triangle),
+            depth_slopes: depth_slopes(triangle),
             columns: range(0, size[0]),
             rows: range(1, size[1]),
         }
@@ -137,7 +137,7 @@ impl<'a> Raster<'a> {
                 x: x as u16,
                 y: y as u16,
                 coverage,
-                depth: self.depth_at(centre),
+                depth: self.depth_plane(centre, shade_at),
                 shade_at,
             });
         }
@@ -165,17 +165,31 @@ impl<'a> Raster<'a> {
         [centre[0] + offset[0], centre[1] + offset[1]]
     }
 
-    fn depth_at(&self, [x, y]: [i64; 2]) -> DepthPlane {
-        let [origin, per_x, per_y] = self.depth;
-        let z = origin + per_x * x as f64 + per_y * y as f64;
-        let per_pixel = |slope: f64| (slope * STEPS as f64).round() as i32;
-        DepthPlane {
-            // The cast saturates: a plane that leaves the depth range within the
-            // pixel is cut there.
-            z: Unorm32(z.round() as u32),
-            dzdx: per_pixel(per_x),
-            dzdy: per_pixel(per_y),
+    /// The triangle's depth at a point of its plane, in units of the depth range.
+    fn depth_at(&self, [x, y]: [i64; 2]) -> f64 {
+        let [per_x, per_y] = self.depth_slopes;
+        // From a corner on: the steep planes of slivers lose too many digits over
+        // the whole frame.
+        let [x0, y0] = self.triangle.corners[0];
+        self.triangle.depth[0] + per_x * (x - x0) as f64 + per_y * (y - y0) as f64
+    }
+
+    /// The depth over the pixel at `centre`, of which the triangle holds `inside`.
+    fn depth_plane(&self, centre: [i64; 2], inside: [i64; 2]) -> DepthPlane {
+        let z = self.depth_at(centre).round();
+        let slopes = self.depth_slopes.map(|slope| (slope * STEPS as f64).round());
+        let fits = (0.0..=f64::from(u32::MAX)).contains(&z)
+            && slopes.iter().all(|s| s.abs() <= f64::from(i32::MAX));
+        if fits {
+            let [dzdx, dzdy] = slopes.map(|s| s as i32);
+            return DepthPlane { z: Unorm32(z as u32), dzdx, dzdy };
         }
+        // A sliver's plane can leave the depth range between a covered sample and
+        // the pixel's centre. Then the pixel has one depth, the triangle's own at a
+        // point that it holds.
+        let [z0, z1, z2] = self.triangle.depth;
+        let z = self.depth_at(inside).clamp(z0.min(z1).min(z2), z0.max(z1).max(z2));
+        DepthPlane { z: Unorm32(z.round() as u32), dzdx: 0, dzdy: 0 }
     }
 
     /// The weights of the three corners at a point, in perspective; and how they
@@ -219,14 +233,14 @@ pub(crate) struct Weights {
     pub dy: [f64; 3],
 }
 
-/// Depth as a plane over the frame: at its top left, and per step along x and y.
-fn depth_plane(t: &ScreenTriangle) -> [f64; 3] {
+/// How a triangle's depth changes per step along x and y.
+fn depth_slopes(t: &ScreenTriangle) -> [f64; 2] {
     let [p0, p1, p2] = t.corners.map(|p| p.map(|v| v as f64));
     let [z0, z1, z2] = t.depth;
     let area = t.area as f64;
     let per_x = ((z1 - z0) * (p2[1] - p0[1]) - (z2 - z0) * (p1[1] - p0[1])) / area;
     let per_y = ((z2 - z0) * (p1[0] - p0[0]) - (z1 - z0) * (p2[0] - p0[0])) / area;
-    [z0 - per_x * p0[0] - per_y * p0[1], per_x, per_y]
+    [per_x, per_y]
 }
 
 #[cfg(test)]
@@ -381,5 +395,40 @@ mod tests {
                 });
             }
         }
+    }
+
+    #[test]
+    fn slivers_stay_within_their_depths() {
+        let offsets = offsets(16);
+        let mut random = Stream::new([4]);
+        let (mut flat, mut all) = (0, 0);
+        for _ in 0..4000 {
+            // Long and thin, over a small range of depths.
+            let start = [i64::from(random.below(4096)), i64::from(random.below(4096))];
+            let mut near = |reach: u32| {
+                start.map(|v| v + i64::from(random.below(2 * reach)) - i64::from(reach))
+            };
+            let corners = [start, near(2000), near(12)];
+            let nearest = f64::from(random.word());
+            let depth = std::array::from_fn(|_| {
+                (nearest + f64::from(random.below(1 << 26))).min(f64::from(u32::MAX))
+            });
+            let Some(t) = triangle(corners, depth) else { continue };
+            let raster = Raster::new(&t, &offsets, [16, 16]);
+            let range = |pick: fn(f64, f64) -> f64| t.depth.into_iter().reduce(pick).unwrap();
+            let (low, high) = (range(f64::min), range(f64::max));
+            for y in raster.rows().0..=raster.rows().1 {
+                raster.row(y, |hit| {
+                    all += 1;
+                    flat += u32::from((hit.depth.dzdx, hit.depth.dzdy) == (0, 0));
+                    for s in hit.coverage.iter() {
+                        let at = hit.depth.at(offsets[s].map(|v| (v * 16 / STEPS) as i8));
+                        let at = f64::from(at.0);
+                        assert!(at > low - 2.0 && at < high + 2.0, "{at} of {low} to {high}");
+                    }
+                });
+            }
+        }
+        assert!(flat > 100 && all > 4 * flat, "{flat} of {all} are flat");
     }
 }

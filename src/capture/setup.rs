@@ -64,21 +64,21 @@ pub(crate) fn set_up(
         return;
     }
     let snapped: Vec<[i64; 2]> = polygon.iter().map(|c| snap(c.clip, camera.size)).collect();
+    let (apex, whole) = apex(&snapped);
+    // Counter-clockwise with y upwards is the front: that is a negative area with
+    // y downwards.
+    if whole > 0 && !keep_back {
+        return;
+    }
     for i in 1..polygon.len() - 1 {
-        let mut order = [0, i, i + 1];
-        let [a, b, c] = order.map(|k| snapped[k]);
-        let mut area = cross(a, b, c);
-        if area == 0 {
-            continue;
-        }
-        // Counter-clockwise with y upwards is the front: that is a negative area
-        // with y downwards.
-        if area > 0 && !keep_back {
-            continue;
-        }
-        if area < 0 {
+        let mut order = piece(apex, i, polygon.len());
+        if whole < 0 {
             order.swap(1, 2);
-            area = -area;
+        }
+        let [a, b, c] = order.map(|k| snapped[k]);
+        let area = cross(a, b, c);
+        if area <= 0 {
+            continue;
         }
         let pick = order.map(|k| polygon[k]);
         out.push(ScreenTriangle {
@@ -89,6 +89,25 @@ pub(crate) fn set_up(
             weights: pick.map(|c| c.weights),
         });
     }
+}
+
+/// The corner around which a polygon is cut into triangles, and twice the
+/// polygon's area. Snapping can bend a clipped polygon inwards, by less than a
+/// step: the corner is one from which no piece folds back, where there is one.
+fn apex(polygon: &[[i64; 2]]) -> (usize, i64) {
+    let pieces = 1..polygon.len() - 1;
+    let area = |apex: usize, i: usize| {
+        let [a, b, c] = piece(apex, i, polygon.len()).map(|k| polygon[k]);
+        cross(a, b, c)
+    };
+    let whole: i64 = pieces.clone().map(|i| area(0, i)).sum();
+    let folds = |apex: usize| pieces.clone().any(|i| area(apex, i) * whole.signum() < 0);
+    ((0..polygon.len()).find(|apex| !folds(*apex)).unwrap_or(0), whole)
+}
+
+/// The corners of the `i`-th triangle around corner `apex` of a polygon of `n`.
+fn piece(apex: usize, i: usize, n: usize) -> [usize; 3] {
+    [apex, (apex + i) % n, (apex + i + 1) % n]
 }
 
 fn unit(i: usize) -> [f64; 3] {
@@ -132,4 +151,22 @@ fn snap(clip: DVec4, size: [f64; 2]) -> [i64; 2] {
     let round =
         |ndc: f64, pixels: f64| ((ndc * 0.5 + 0.5) * pixels * STEPS as f64 + 0.5).floor() as i64;
     [round(clip.x / clip.w, size[0]), round(-clip.y / clip.w, size[1])]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_polygon_that_is_bent_inwards_is_cut_from_the_bend() {
+        let polygon = [[0, 0], [10, 1], [20, 0], [20, 20], [0, 20]];
+        let (from, whole) = apex(&polygon);
+        assert_eq!((from, whole), (1, 780));
+        let areas = (1..4).map(|i| {
+            let [a, b, c] = piece(from, i, 5).map(|k| polygon[k]);
+            cross(a, b, c)
+        });
+        assert!(areas.clone().all(|a| a > 0) && areas.sum::<i64>() == whole);
+        assert_eq!(apex(&[[0, 0], [0, 8], [8, 8]]), (0, -64));
+    }
 }

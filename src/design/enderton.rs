@@ -59,7 +59,12 @@ impl Blueprint for Enderton {
         // chooses among the samples that earlier fragments have left it.
         let naive = values.choice::<MaskRule>("mask") == MaskRule::Naive;
         let among_all = values.choice::<Among>("among") == Among::Covered;
-        Promises { unbiased: true, consistent: true, order_independent: naive || among_all }
+        let apart = depth_bits::tells_apart(values);
+        Promises {
+            unbiased: apart,
+            consistent: apart,
+            order_independent: apart && (naive || among_all),
+        }
     }
 }
 
@@ -142,7 +147,7 @@ impl<const N: usize> Design for EndertonAt<N> {
     ) {
         let z: [Unorm32; N] = self.frame.depths(fragment, self.depth_bits);
         let passed = samples.depth_test(fragment.coverage, &z);
-        probe.passed(passed);
+        probe.depth_test(fragment.coverage, passed);
         probe.state(self.depth_bits * fragment.coverage.count(), 0);
         if passed.is_empty() {
             return;

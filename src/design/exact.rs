@@ -68,7 +68,8 @@ impl<const N: usize> Design for ExactAt<N> {
         let Fragment { coverage, depth, colour, alpha, .. } = *fragment;
         layers.push(Layer { coverage, depth, colour, alpha });
         probe.written(coverage);
-        probe.state(0, 8 * size_of::<Layer>() as u32);
+        // Its coverage, its depth plane, its colour and its alpha.
+        probe.state(0, N as u32 + 3 * 32 + self.frame.colour_bits + 32);
     }
 
     /// `C = Σ α_i c_i Π (1 − α_j)` over the fragments from near to far, at each

@@ -57,12 +57,15 @@ impl Blueprint for LaineKarras {
     type At<const N: usize> = LaineKarrasAt<N>;
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<LaineKarrasAt<N>> {
+        let compact = values.flag("compact");
         Ok(LaineKarrasAt {
             frame: frame.clone(),
             sort: values.flag("sort"),
-            compact: values.flag("compact"),
+            compact,
             surfaces: values.choice("surfaces"),
-            track: values.choice("track"),
+            // Without compaction all covered samples are tracked and numbered either
+            // way, so no counter is needed.
+            track: if compact { values.choice("track") } else { Tracked::Survivors },
             pixel_order: values.choice("pixel-order"),
             reference: values.choice("reference"),
             depth_bits: depth_bits::of(values),
@@ -78,18 +81,20 @@ impl Blueprint for LaineKarras {
         // which of that surface's samples it wrote: where they passed, they hide the
         // conflict, the surface goes on, and the samples still to come are given the
         // complementary reference values, which rather fail; where they did not pass,
-        // a new surface starts afresh. Any of these breaks the link; a primitive's
-        // fragments do not meet themselves.
+        // a new surface starts afresh. Any of these breaks the link. (With surfaces
+        // = primitive it takes a primitive whose pieces in a pixel come with others
+        // between them, which a trace may hold although no rasteriser makes it.)
         let rule: SurfaceRule = values.choice("surfaces");
+        let apart = depth_bits::tells_apart(values);
         let chance_decides_surfaces = reference != Reference::White
-            && matches!(rule, SurfaceRule::Bitmask | SurfaceRule::Object)
+            && rule != SurfaceRule::EveryFragment
             && values.choice::<Tracked>("track") == Tracked::Survivors
             && values.flag("compact");
         Promises {
-            unbiased: scrambled && !chance_decides_surfaces,
+            unbiased: apart && scrambled && !chance_decides_surfaces,
             // Unscrambled values still share out each stored surface evenly, as long as
             // its samples are numbered in a row.
-            consistent: scrambled || (values.flag("compact") && values.flag("sort")),
+            consistent: apart && (scrambled || (values.flag("compact") && values.flag("sort"))),
             order_independent: false,
         }
     }
@@ -153,7 +158,7 @@ impl<const N: usize> Design for LaineKarrasAt<N> {
         // 1–3: drop the samples that fail the depth test. With `compact` off that
         // waits until line 12, and all covered samples are tracked and numbered.
         let passed = p.samples.depth_test(fragment.coverage, &z);
-        probe.passed(passed);
+        probe.depth_test(fragment.coverage, passed);
         probe.state(self.depth_bits * fragment.coverage.count(), 0);
         let s = if self.compact { passed } else { fragment.coverage };
         // The figure tracks what is left of S; see `Tracked` for the alternative.

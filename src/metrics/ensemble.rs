@@ -95,27 +95,37 @@ impl<'a> Ensemble<'a> {
     }
 
     /// Calls `each` with the mean error and the variance over the runs of every
-    /// channel of every touched pixel of `region`.
-    fn for_each_channel(&self, region: &Region, mut each: impl FnMut(f64, f64)) {
+    /// channel of `region`, and with how many pixels have just these: 1, or all that
+    /// no run has touched.
+    fn for_each_channel(&self, region: &Region, mut each: impl FnMut(f64, f64, u64)) {
         let n = self.runs.first().map_or(0, Vec::len) as f64;
+        let mut pixel = |sum: &[f64; 3], square: &[f64; 3], times| {
+            for (s, q) in sum.iter().zip(square) {
+                let mean = s / n;
+                each(mean, ((q - s * mean) / (n - 1.0)).max(0.0), times);
+            }
+        };
+        let mut visited = 0;
         for (tile, (sum, square)) in self.sums.touched() {
             for within in (0..TILE_PIXELS).filter(|w| region.holds(*tile, *w)) {
-                for (s, q) in sum[within].iter().zip(&square[within]) {
-                    let mean = s / n;
-                    each(mean, ((q - s * mean) / (n - 1.0)).max(0.0));
-                }
+                pixel(&sum[within], &square[within], 1);
+                visited += 1;
             }
+        }
+        if region.pixels() > visited {
+            pixel(&self.rest.0, &self.rest.1, region.pixels() - visited);
         }
     }
 
-    /// For every channel of every touched pixel of the region at place `region`:
+    /// For every channel of every pixel of the region at place `region` (of those that
+    /// no run touched, one for all):
     /// the mean error over the runs, in units of its standard error. 0 where all
     /// runs agree with the reference, infinite where they agree with each other
     /// and not with it.
     pub fn z_scores(&self, region: usize) -> Vec<f64> {
         let n = self.runs[region].len() as f64;
         let mut scores = Vec::new();
-        self.for_each_channel(self.regions[region], |mean, variance| {
+        self.for_each_channel(self.regions[region], |mean, variance, _| {
             // Rounding leaves crumbs where all runs are equal.
             let exact = mean.abs() < 1e-6 && variance < 1e-12;
             scores.push(if exact { 0.0 } else { mean / (variance / n).sqrt() });
@@ -137,10 +147,10 @@ impl<'a> Ensemble<'a> {
         let means: Vec<f64> = runs.iter().map(|r| r.mean).collect();
         let (mut variance, mut bias_squared) = (0.0, 0.0);
         if runs.len() > 1 {
-            self.for_each_channel(region, |mean, v| {
-                variance += v;
+            self.for_each_channel(region, |mean, v, pixels| {
+                variance += v * pixels as f64;
                 // E[mean²] = bias² + v/n.
-                bias_squared += mean * mean - v / n;
+                bias_squared += (mean * mean - v / n) * pixels as f64;
             });
         }
         let scale = 1.0 / ((3 * region.pixels()).max(1) as f64 * UNIT * UNIT);
@@ -218,7 +228,10 @@ mod tests {
         ensemble.add(&touched);
         ensemble.add(&Picture::new(grid, [1.0; 3]));
         let e = &ensemble.finish()[0];
-        // Half of the pixels have 1, 3, 1: variance 4/3; the others have none.
+        // Half of the pixels have 1, 3, 1: variance 4/3 about 5/3; the others 1 always.
         assert!((e.variance.unwrap() * UNIT * UNIT - 2.0 / 3.0).abs() < 1e-12);
+        let bias_squared = (25.0 / 9.0 - 4.0 / 9.0 + 1.0) / 2.0;
+        assert!((e.bias_squared.unwrap() * UNIT * UNIT - bias_squared).abs() < 1e-12);
+        assert_eq!(ensemble.z_scores(0).len(), 3 * (256 + 1));
     }
 }

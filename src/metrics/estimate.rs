@@ -15,8 +15,9 @@ pub struct Estimate {
     pub high: f64,
 }
 
-/// Student's t for a two-sided 95 % interval with `freedom` degrees of freedom.
-fn student95(freedom: f64) -> f64 {
+/// Student's t for a two-sided 95 % interval with `freedom` degrees of freedom: what
+/// an interval's half-width is in standard errors.
+pub fn student95(freedom: f64) -> f64 {
     StudentsT::new(0.0, 1.0, freedom).map_or(f64::INFINITY, |t| t.inverse_cdf(0.975))
 }
 

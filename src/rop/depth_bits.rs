@@ -14,6 +14,12 @@ crate::options! {
 /// The parameter's declaration.
 pub const PARAM: Param = Param::choice::<DepthBits>("depth-bits", "32", "bits of a stored depth");
 
+/// Whether all depths that the trace tells apart are told apart when stored. Where
+/// they are not, the surface drawn last hides one slightly nearer: no promise holds.
+pub fn tells_apart(values: &Values) -> bool {
+    of(values) == 32
+}
+
 /// The parameter's value: 32, 24 or 16.
 pub fn of(values: &Values) -> u32 {
     match values.choice(PARAM.name) {

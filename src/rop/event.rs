@@ -10,8 +10,8 @@ use crate::trace::{MAX_SAMPLES, SampleMask};
 pub trait Probe {
     /// A fragment reached the pixel, covering these samples.
     fn fragment(&mut self, _covered: SampleMask) {}
-    /// These of its samples passed the depth test.
-    fn passed(&mut self, _samples: SampleMask) {}
+    /// These of its samples were put to the depth test, and these passed it.
+    fn depth_test(&mut self, _tested: SampleMask, _passed: SampleMask) {}
     /// The fragment starts a new surface with this number.
     fn surface(&mut self, _number: u32) {}
     /// Samples were sorted; this is their order now.
@@ -38,7 +38,7 @@ impl Probe for NoProbe {}
 pub struct EventCounts {
     /// Fragments drawn; over several passes each counts several times.
     pub fragments: u64,
-    /// Samples that fragments covered, each put to the depth test.
+    /// Samples put to the depth test.
     pub samples_tested: u64,
     /// Samples that passed it.
     pub samples_passed: u64,
@@ -102,13 +102,13 @@ impl EventCounts {
 
 impl Probe for EventCounts {
     #[inline]
-    fn fragment(&mut self, covered: SampleMask) {
+    fn fragment(&mut self, _covered: SampleMask) {
         self.fragments += 1;
-        self.samples_tested += u64::from(covered.count());
     }
     #[inline]
-    fn passed(&mut self, samples: SampleMask) {
-        self.samples_passed += u64::from(samples.count());
+    fn depth_test(&mut self, tested: SampleMask, passed: SampleMask) {
+        self.samples_tested += u64::from(tested.count());
+        self.samples_passed += u64::from(passed.count());
     }
     #[inline]
     fn surface(&mut self, _number: u32) {
@@ -175,8 +175,8 @@ impl Probe for Record {
     fn fragment(&mut self, covered: SampleMask) {
         self.covered = covered;
     }
-    fn passed(&mut self, samples: SampleMask) {
-        self.passed = Some(samples);
+    fn depth_test(&mut self, _tested: SampleMask, passed: SampleMask) {
+        self.passed = Some(passed);
     }
     fn surface(&mut self, number: u32) {
         self.surface = Some(number);

@@ -157,12 +157,13 @@ fn thousands_of_layers_in_one_pixel() {
     }
 }
 
-/// Random fragments at distinct depths; `pixels` of them hold all.
+/// Random fragments at distinct depths so close that fewer than 32 bits merge them.
 fn distinct_depths(samples: u32) -> (screendoor::trace::Header, Vec<Fragment>) {
     let header = header(16, 16, samples);
     let mut fragments = random_fragments(&header, 3000, 12);
     for (i, f) in fragments.iter_mut().enumerate() {
-        f.depth.z = Unorm32((i as u32).wrapping_mul(2_654_435_761));
+        // 3001 is prime: no depth comes twice.
+        f.depth.z = Unorm32(i as u32 * 1103 % 3001);
         (f.depth.dzdx, f.depth.dzdy) = (0, 0);
     }
     (header, fragments)
@@ -176,10 +177,6 @@ fn order_changes_the_picture_only_where_that_is_not_ruled_out() {
     let (a, b) = (trace(&header, &fragments), trace(&header, &shuffled));
     for design in all_variants() {
         let label = design.label();
-        // Depths that are distinct in 32 bits are not in fewer.
-        if label.contains("depth-bits") {
-            continue;
-        }
         let same = picture(&design, &a, 8, 1).hash() == picture(&design, &b, 8, 1).hash();
         assert_eq!(same, design.promises().order_independent, "{label}");
     }
@@ -188,7 +185,8 @@ fn order_changes_the_picture_only_where_that_is_not_ruled_out() {
 #[test]
 fn more_samples_come_nearer_where_that_is_promised_and_only_there() {
     let header = header(24, 24, 64);
-    let coherent = layered(&header, 8, |i| (1000 * i, [(i % 3) as f32 / 2.0; 3], 0.3));
+    // So close that a narrow depth buffer merges them.
+    let coherent = layered(&header, 8, |i| (i, [(i % 3) as f32 / 2.0; 3], 0.3));
     let mut random = random_fragments(&header, 24 * 24 * 8, 31);
     for f in &mut random {
         f.coverage = SampleMask(u64::MAX);
@@ -203,7 +201,7 @@ fn more_samples_come_nearer_where_that_is_promised_and_only_there() {
             // From 2 to 64 samples independent sampling gains √32 = 5.7.
             (error(2), error(64))
         });
-        let nearer = gains.iter().all(|(few, many)| many * 3.0 <= *few);
+        let nearer = gains.iter().all(|(few, many)| many * 4.0 <= *few);
         assert_eq!(nearer, design.promises().consistent, "{}: {gains:?}", design.label());
     }
 }
@@ -226,9 +224,10 @@ fn counts_add_up_and_counting_changes_nothing() {
             let passes = u64::from(counted.passes);
             assert_eq!(events.fragments, covered.len() as u64 * passes, "{label}");
             let tested = covered.iter().map(|n| u64::from(*n)).sum::<u64>() * passes;
-            assert_eq!(events.samples_tested, tested, "{label}");
+            // Who has no depth test must not claim any.
+            assert!([0, tested].contains(&events.samples_tested), "{label}");
             assert!(events.samples_passed <= events.samples_tested, "{label}");
-            assert!(events.samples_written <= events.samples_tested, "{label}");
+            assert!(events.samples_written <= tested, "{label}");
             assert!(events.samples_written > 0 && events.state_bits_written > 0, "{label}");
         }
     }

@@ -2,6 +2,7 @@
 
 mod cli;
 mod conformance;
+mod events;
 mod golden;
 mod guarantees;
 mod hostile;

@@ -7,7 +7,7 @@ use std::fmt::Write;
 
 pub use figures::{FIGURES, Figure, figures};
 
-use crate::metrics::Estimate;
+use crate::metrics::{Estimate, student95};
 use crate::report::markdown_table;
 use crate::study::publications::{BLOCKS, Publications};
 
@@ -69,12 +69,13 @@ fn expectations(text: &mut String, p: &Publications) {
          every other variant in which chance does not decide the surface.\n",
         p.effort.seeds_of_means
     );
+    let freedom = f64::from(p.effort.seeds_of_means - 1);
     let rows: Vec<Vec<String>> = p
         .means
         .iter()
         .map(|m| {
             let outside = m.mean.low > 0.0 || m.mean.high < 0.0;
-            let sigmas = m.mean.value.abs() / (m.mean.half_width() / 1.96);
+            let sigmas = m.mean.value.abs() / (m.mean.half_width() / student95(freedom));
             vec![
                 format!("`{}`", m.design),
                 m.samples.to_string(),

@@ -1,0 +1,147 @@
+//! What the ROPs are said to have done, against counts made by hand.
+
+use screendoor::rop::{EventCounts, Frame, ReplayOptions, Site, StateBits};
+use screendoor::trace::{DepthPlane, Fragment, SampleMask, Trace, Unorm32};
+
+use crate::util::{all_variants, design, header, random_fragments, trace};
+
+/// Three opaque fragments in one pixel of 4 samples.
+fn three_fragments() -> Trace {
+    let fragment = |i: u32, coverage, z| Fragment {
+        x: 0,
+        y: 0,
+        coverage: SampleMask(coverage),
+        depth: DepthPlane { z: Unorm32(z), dzdx: 0, dzdy: 0 },
+        colour: [1.0; 3],
+        alpha: 1.0,
+        primitive: i,
+        object: 0,
+    };
+    let fragments = [
+        // Two samples of a cleared pixel.
+        fragment(0, 0b0011, 100),
+        // Three, one of which the first fragment holds: in front of it.
+        fragment(1, 0b1110, 50),
+        // All; only sample 0, at 100, lies behind it.
+        fragment(2, 0b1111, 70),
+    ];
+    trace(&header(1, 1, 4), &fragments)
+}
+
+fn events(spec: &str) -> EventCounts {
+    let options = ReplayOptions { count_events: true, ..ReplayOptions::default() };
+    design(spec).replay(&three_fragments(), 4, 0, &options).unwrap().events.unwrap()
+}
+
+/// Counts with sorts given by how many of them were of 2, 3 and 4 samples.
+fn counts(
+    [tested, passed, written]: [u64; 3],
+    hashes: u64,
+    sorts: [u64; 3],
+    surfaces: u64,
+    state: [u64; 2],
+) -> EventCounts {
+    let mut expected = EventCounts {
+        fragments: 3,
+        samples_tested: tested,
+        samples_passed: passed,
+        samples_written: written,
+        hashes,
+        surfaces,
+        state_bits_read: state[0],
+        state_bits_written: state[1],
+        ..EventCounts::default()
+    };
+    expected.sorts_by_length[2..5].copy_from_slice(&sorts);
+    expected
+}
+
+#[test]
+fn three_fragments_cost_what_they_cost() {
+    // 2 + 3 + 4 samples tested, 2 + 3 + 1 passed, and all of these written: a
+    // depth is 32 bits, a colour 48, a sample 80.
+    let (samples, depths, writes) = ([9, 6, 6], 9 * 32, 6 * 80);
+    // LK hashes for each sample that passed and sorts these; the second fragment
+    // meets sample 1, which the first holds. Surface number and mask are 32 + 4
+    // bits, read and written by each fragment.
+    let lk = |sorts, surfaces, tracking: u64| {
+        counts(samples, 6, sorts, surfaces, [depths + 3 * tracking, writes + 3 * tracking])
+    };
+    assert_eq!(events("lk"), lk([1, 1, 0], 1, 36));
+    assert_eq!(events("lk:sort=false"), lk([0, 0, 0], 1, 36));
+    // No mask; each fragment a surface.
+    assert_eq!(events("lk:surfaces=every-fragment"), lk([1, 1, 0], 3, 32));
+    // The last primitive beside the mask, and each fragment another primitive.
+    assert_eq!(events("lk:surfaces=primitive"), lk([1, 1, 0], 2, 68));
+    // A counter from 0 to 4; the third fragment meets samples behind which it lies.
+    assert_eq!(events("lk:track=covered"), lk([1, 1, 0], 2, 39));
+    // All covered samples are numbered, hashed for, sorted and tracked.
+    let all = counts(samples, 9, [1, 1, 1], 2, [depths + 3 * 36, writes + 3 * 36]);
+    assert_eq!(events("lk:compact=false"), all);
+    assert_eq!(events("lk:compact=false,track=covered"), all);
+    // 16 bits merge the depths: the third fragment passes everywhere, and meets the
+    // second.
+    let merged = counts([9, 9, 9], 9, [1, 1, 1], 2, [9 * 16 + 3 * 36, 9 * 64 + 3 * 36]);
+    assert_eq!(events("lk:depth-bits=16"), merged);
+
+    // A hash for each sample to choose from, and with strata one for their number.
+    let enderton = |hashes| counts(samples, hashes, [0; 3], 0, [depths, writes]);
+    assert_eq!(events("enderton"), enderton(6 + 3));
+    assert_eq!(events("enderton:among=covered"), enderton(9 + 3));
+    assert_eq!(events("enderton:mask=naive"), enderton(6));
+
+    // No depth test; each fragment is kept: mask, plane, colour and alpha.
+    let kept = 3 * (4 + 96 + 48 + 32);
+    assert_eq!(events("exact"), counts([0, 0, 9], 0, [0; 3], 0, [0, kept]));
+}
+
+#[test]
+fn state_per_pixel() {
+    let trace = three_fragments();
+    let frame = Frame::of(&trace, 4, 0).unwrap();
+    for (spec, samples, extra) in [
+        ("lk", 320, 36),
+        ("lk:surfaces=every-fragment", 320, 32),
+        ("lk:surfaces=object", 320, 68),
+        ("lk:track=covered", 320, 39),
+        ("lk:track=covered,compact=false", 320, 36),
+        ("lk:track=covered,surfaces=every-fragment", 320, 32),
+        ("lk:depth-bits=24", 288, 36),
+        ("enderton", 320, 0),
+        ("enderton:depth-bits=16", 256, 0),
+    ] {
+        let expected = StateBits { samples, extra, unbounded: false };
+        assert_eq!(design(spec).state_bits(&frame).unwrap(), expected, "{spec}");
+    }
+    assert!(design("exact").state_bits(&frame).unwrap().unbounded);
+}
+
+#[test]
+fn what_is_counted_is_what_is_explained() {
+    let header = header(5, 4, 8);
+    let trace = trace(&header, &random_fragments(&header, 300, 8));
+    for design in all_variants() {
+        let options = ReplayOptions { count_events: true, ..ReplayOptions::default() };
+        let counted = design.replay(&trace, 8, 3, &options).unwrap().events.unwrap();
+        let mut explained = EventCounts::default();
+        for (x, y) in (0..5).flat_map(|x| (0..4).map(move |y| (x, y))) {
+            let pixel = design.explain(&trace, 8, 3, Site { x, y }, &|_, _| ()).unwrap();
+            for record in pixel.steps.iter().map(|step| &step.record) {
+                explained.fragments += 1;
+                if let Some(passed) = record.passed {
+                    explained.samples_tested += u64::from(record.covered.count());
+                    explained.samples_passed += u64::from(passed.count());
+                }
+                explained.samples_written += u64::from(record.written.count());
+                explained.hashes += u64::from(record.hashes);
+                if let Some(order) = record.order.as_ref().filter(|order| order.len() > 1) {
+                    explained.sorts_by_length[order.len()] += 1;
+                }
+                explained.surfaces += u64::from(record.surface.is_some());
+                explained.state_bits_read += u64::from(record.state_bits_read);
+                explained.state_bits_written += u64::from(record.state_bits_written);
+            }
+        }
+        assert_eq!(counted, explained, "{}", design.label());
+    }
+}
