@@ -15,10 +15,12 @@ pub struct Estimate {
     pub high: f64,
 }
 
-/// Student's t for a two-sided 95 % interval with `freedom` degrees of freedom: what
-/// an interval's half-width is in standard errors.
-pub fn student95(freedom: f64) -> f64 {
-    StudentsT::new(0.0, 1.0, freedom).map_or(f64::INFINITY, |t| t.inverse_cdf(0.975))
+/// Student's t for a two-sided interval of `confidence` over `runs` runs: its
+/// half-width in standard errors.
+pub fn student_t(confidence: f64, runs: usize) -> f64 {
+    let freedom = runs.saturating_sub(1) as f64;
+    let quantile = 0.5 + confidence / 2.0;
+    StudentsT::new(0.0, 1.0, freedom).map_or(f64::INFINITY, |t| t.inverse_cdf(quantile))
 }
 
 impl Estimate {
@@ -30,7 +32,7 @@ impl Estimate {
             return Estimate { value: mean, low: mean, high: mean };
         }
         let square = runs.iter().map(|r| (r - mean) * (r - mean)).sum::<f64>();
-        let half = student95(n - 1.0) * (square / (n - 1.0) / n).sqrt();
+        let half = student_t(0.95, runs.len()) * (square / (n - 1.0) / n).sqrt();
         Estimate { value: mean, low: mean - half, high: mean + half }
     }
 
@@ -58,6 +60,11 @@ impl Estimate {
         }
     }
 
+    /// How far an [`Estimate::of`] so many runs lies from 0, in standard errors.
+    pub fn standard_errors(&self, runs: usize) -> f64 {
+        self.value.abs() * student_t(0.95, runs) / self.half_width()
+    }
+
     /// Half of the interval's width.
     pub fn half_width(&self) -> f64 {
         (self.high - self.low) / 2.0
@@ -74,6 +81,8 @@ mod tests {
         let e = Estimate::of(&[1.0, 2.0, 3.0, 4.0, 5.0]);
         assert_eq!(e.value, 3.0);
         assert!((e.half_width() - 2.776_445 * 0.5_f64.sqrt()).abs() < 1e-5, "{e:?}");
+        // 3 is 3 / √½ of its standard errors.
+        assert!((e.standard_errors(5) - 3.0 * 2_f64.sqrt()).abs() < 1e-9);
         assert_eq!(Estimate::of(&[7.0]), Estimate { value: 7.0, low: 7.0, high: 7.0 });
     }
 

@@ -11,7 +11,7 @@ mod region;
 use serde::Serialize;
 
 pub use ensemble::{Ensemble, EnsembleErrors};
-pub use estimate::{Estimate, student95};
+pub use estimate::{Estimate, student_t};
 pub use region::{PixelClasses, Region};
 
 use crate::picture::{Picture, srgb};

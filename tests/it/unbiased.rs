@@ -9,7 +9,7 @@
 
 use screendoor::design::{Configured, Entry};
 use screendoor::error::Result;
-use screendoor::metrics::{Ensemble, Region, student95};
+use screendoor::metrics::{Ensemble, Region, student_t};
 use screendoor::param::Values;
 use screendoor::random::{Stream, hash};
 use screendoor::rop::{
@@ -18,7 +18,7 @@ use screendoor::rop::{
 };
 use screendoor::tile::TileGrid;
 use screendoor::trace::{DepthPlane, Fragment, Header, SampleMask, Trace, Unorm32};
-use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
+use statrs::distribution::{ContinuousCDF, Normal};
 
 use crate::util::{all_variants, design, header, layered, picture, random_fragments, trace};
 
@@ -115,12 +115,7 @@ fn deviations(design: &Configured, trace: &Trace, samples: u32) -> (f64, f64, us
     // Seeds that are far apart in no particular way.
     (0..SEEDS).for_each(|i| ensemble.add(&picture(design, trace, samples, hash([i]))));
     let e = &ensemble.finish()[0];
-    let half_width = e.mean.half_width();
-    let t = if e.mean.value.abs() < 1e-9 {
-        0.0
-    } else {
-        e.mean.value.abs() / half_width * student95(f64::from(SEEDS - 1))
-    };
+    let t = if e.mean.value.abs() < 1e-9 { 0.0 } else { e.mean.standard_errors(SEEDS as usize) };
     let scores = ensemble.z_scores(0);
     let z = scores.iter().fold(0.0_f64, |worst, z| worst.max(z.abs()));
     (t, z, scores.len())
@@ -134,8 +129,7 @@ fn looks_unbiased(design: &Configured, samples: u32, designs: usize) -> (bool, S
     for (name, header, fragments) in cases(samples) {
         let (t, z, channels) = deviations(design, &trace(&header, &fragments), samples);
         let tests = designs as f64 * TRIALS * 2.0;
-        let student = StudentsT::new(0.0, 1.0, f64::from(SEEDS - 1)).unwrap();
-        let t_limit = student.inverse_cdf(1.0 - SIGNIFICANCE / tests / 2.0);
+        let t_limit = student_t(1.0 - SIGNIFICANCE / tests, SEEDS as usize);
         let normal = Normal::new(0.0, 1.0).unwrap();
         let z_limit = normal.inverse_cdf(1.0 - SIGNIFICANCE / tests / channels as f64 / 2.0);
         good &= t < t_limit && z < z_limit;

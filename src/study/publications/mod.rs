@@ -10,8 +10,9 @@ use serde::Serialize;
 
 pub use figures::{BLOCKS, Dithering, NamedPicture};
 pub use sampling::{FarSamples, MeanError, RowDifference};
-pub use table_1::{COUNTS, DESIGNS, Published, Table1, Variation};
+pub use table_1::{Aspect, COUNTS, DESIGNS, Published, Table1, Variation};
 
+pub use crate::capture::Order;
 use crate::capture::{Capture, CaptureOptions};
 use crate::design::{Configured, configure};
 use crate::error::Result;

@@ -109,6 +109,9 @@ pub struct Variation {
     /// Which scene.
     pub scene: &'static str,
     /// What differs.
+    #[serde(skip)]
+    pub aspect: Aspect,
+    /// How it is seen.
     pub what: String,
     /// Fragments per covered pixel.
     pub fragments_per_pixel: f64,
@@ -116,6 +119,21 @@ pub struct Variation {
     pub edge_share: f64,
     /// RMSE over the covered pixels of [`DESIGNS`].
     pub rmse: [Estimate; 3],
+}
+
+/// What a variation varies.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Aspect {
+    /// Nothing: the scene as the table has it, its triangles in this order.
+    Nothing(Order),
+    /// From where it is seen.
+    Angle,
+    /// The frame's size: its side is the table's, divided by this.
+    Size(u32),
+    /// The order of the triangles.
+    Order(Order),
+    /// The colour behind.
+    Background,
 }
 
 impl Table1Scene {
@@ -174,26 +192,37 @@ impl Table1Scene {
         let ways = variations(&self.options(effort.side));
         let total = ways.len() as u64;
         let mut list = Vec::new();
-        for (what, options) in ways {
-            progress(&format!("{}: {what}", self.name), list.len() as u64, total);
-            let trace = capture(source, &options, self.white)?;
-            list.push(variation(self.name, what, &trace, effort)?);
+        for way in ways {
+            progress(&format!("{}: {}", self.name, way.what), list.len() as u64, total);
+            let trace = capture(source, &way.options, self.white)?;
+            list.push(variation(self.name, way, &trace, effort)?);
         }
         Ok(list)
     }
 }
 
+/// One way to see a scene.
+struct Way {
+    aspect: Aspect,
+    what: String,
+    options: CaptureOptions,
+}
+
 /// Other ways to see a scene: angles, sizes, orders, backgrounds.
-fn variations(base: &CaptureOptions) -> Vec<(String, CaptureOptions)> {
-    let mut list = vec![("as above".to_string(), base.clone())];
+fn variations(base: &CaptureOptions) -> Vec<Way> {
+    let mut list = Vec::new();
+    let mut add = |aspect, what: &str, options| {
+        list.push(Way { aspect, what: what.to_string(), options });
+    };
+    add(Aspect::Nothing(base.order), "as above", base.clone());
     for yaw in [120.0, 210.0, 300.0] {
         let camera = CameraOptions { angle: Some([yaw, 20.0]), ..base.camera };
-        list.push((format!("from {yaw}°"), CaptureOptions { camera, ..base.clone() }));
+        add(Aspect::Angle, &format!("from {yaw}°"), CaptureOptions { camera, ..base.clone() });
     }
     for part in [2, 4, 8] {
         let (width, height) = (base.width / part, base.height / part);
         let what = format!("{width}×{height} pixels");
-        list.push((what, CaptureOptions { width, height, ..base.clone() }));
+        add(Aspect::Size(part), &what, CaptureOptions { width, height, ..base.clone() });
     }
     for (what, order) in [
         ("triangles in API order", Order::Api),
@@ -202,20 +231,15 @@ fn variations(base: &CaptureOptions) -> Vec<(String, CaptureOptions)> {
         ("far to near", Order::FarToNear),
     ] {
         if order != base.order {
-            list.push((what.to_string(), CaptureOptions { order, ..base.clone() }));
+            add(Aspect::Order(order), what, CaptureOptions { order, ..base.clone() });
         }
     }
     let white = CaptureOptions { background: Some([1.0; 3]), ..base.clone() };
-    list.push(("white background".to_string(), white));
+    add(Aspect::Background, "white background", white);
     list
 }
 
-fn variation(
-    scene: &'static str,
-    what: String,
-    trace: &Trace,
-    effort: Effort,
-) -> Result<Variation> {
+fn variation(scene: &'static str, way: Way, trace: &Trace, effort: Effort) -> Result<Variation> {
     const SAMPLES: u32 = 16;
     let classes = PixelClasses::of(trace, SAMPLES)?;
     let exact = replay("exact", trace, SAMPLES, 0)?.picture;
@@ -238,7 +262,8 @@ fn variation(
     let covered = classes.covered.pixels().max(1) as f64;
     Ok(Variation {
         scene,
-        what,
+        aspect: way.aspect,
+        what: way.what,
         fragments_per_pixel: fragments as f64 / covered,
         edge_share: classes.edges.pixels() as f64 / covered,
         rmse: rmse.try_into().expect("one a design"),
