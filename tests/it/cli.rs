@@ -1,5 +1,8 @@
 //! The program as its users run it.
 
+mod outputs;
+mod words;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -213,7 +216,6 @@ fn wrong_requests_end_with_2_and_a_hint() {
         ),
         (&["capture", "builtin:ramps", "-o", "x.arrow", "--fov", "500"], "field of view"),
         (&["capture", "model.step", "-o", "x.arrow"], "do not come as '.step'"),
-        (&["capture", "builtin:ramps", "-o", "."], "it is a folder"),
         (&["explain", "t.arrow", "--pixel", "99,0"], "outside the frame"),
         (&["explain", "t.arrow", "--pixel", "1.5,0"], "no pixel coordinate"),
         (&["compare", "t.arrow", "t.arrow"], "no picture that can be read"),
@@ -250,7 +252,18 @@ fn bad_files_end_with_1_and_one_line() {
         (&["verify", "t.arrow", "cut.arrow"], "cut.arrow"),
         (&["capture", "missing.obj", "-o", "x.arrow"], "cannot read missing.obj"),
         (&["compare", "text.exr", "text.exr"], "text.exr"),
-        (&["capture", "builtin:ramps", "-o", "no/such/folder/x.arrow"], "cannot create"),
+        (
+            &["capture", "builtin:ramps", "-o", "no/such/folder/x.arrow"],
+            "cannot create no/such/folder/x.arrow: the folder no/such/folder does not exist",
+        ),
+        (&["capture", "builtin:ramps", "-o", "."], "it is a folder"),
+        (&["capture", ".", "-o", "x.arrow"], "it is a folder"),
+        (&["info", "."], "it is a folder"),
+        (&["replay", "."], "it is a folder"),
+        (&["explain", ".", "--pixel", "0,0"], "it is a folder"),
+        (&["verify", "."], "it is a folder"),
+        (&["compare", "a.exr", "."], "it is a folder"),
+        (&["reproduce", "--models", "no/such/folder"], "no such folder"),
     ];
     for (arguments, says) in cases {
         let (code, error) = place.bad(arguments);
@@ -341,12 +354,14 @@ fn progress_stays_out_of_what_is_no_terminal() {
 fn the_demo_does_the_main_job() {
     let place = Workplace::new();
     let text = place.good(&["demo", "--scene", "builtin:ramps", "--output", "out"]);
-    for design in ["lk", "enderton"] {
+    for design in ["lk", "enderton", "enderton-mask-naive"] {
         for samples in [4, 8, 16] {
-            assert!(text.contains(design));
+            assert!(text.contains(&design.replace("-mask-", ":mask=")));
             for ending in ["png", "exr"] {
                 assert!(place.path(&format!("out/{design}-{samples}.{ending}")).exists());
             }
         }
     }
+    assert!(text.contains("at 16 samples lk has 0."), "{text}");
+    assert!(place.path("out/exact.png").exists());
 }
