@@ -57,10 +57,11 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let designs = DESIGNS.map(|d| configure(d, &[])).into_iter().collect::<Result<Vec<_>>>()?;
     let plan = Plan { designs, samples: SAMPLES.to_vec(), seeds: SEEDS };
     let path = folder.join("trace.arrow");
+    // Before the check: names of files are compared within folders that exist.
+    std::fs::create_dir_all(folder).map_err(|e| Error::io("create", folder, e))?;
     let names = picture_paths(folder, &plan.designs);
     let outputs = names.iter().chain([&path]).map(|p| &**p).chain(Json::path(&arguments.json));
     check(scene_path.as_slice(), &outputs.collect::<Vec<_>>())?;
-    std::fs::create_dir_all(folder).map_err(|e| Error::io("create", folder, e))?;
     let file = OutputFile::create(&path)?;
     let create = |path| PictureFile::create(path, SIDE, SIDE);
     let files = names.iter().map(create).collect::<Result<Vec<_>>>()?;

@@ -15,7 +15,7 @@ use crate::trace::Trace;
 /// Refuses a folder in place of an input, and an output that is an input or
 /// another output: writing it would destroy what was read or written before.
 pub(super) fn check(inputs: &[&Path], outputs: &[&Path]) -> Result<()> {
-    for input in inputs.iter().filter(|i| i.is_dir()) {
+    if let Some(input) = inputs.iter().find(|i| i.is_dir()) {
         return refuse_input(input, io::ErrorKind::IsADirectory, "it is a folder; name a file");
     }
     for (i, output) in outputs.iter().enumerate() {

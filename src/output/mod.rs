@@ -73,8 +73,14 @@ impl OutputFile {
         }
         let folder = place::folder(&destination);
         if !folder.is_dir() {
-            let what = if folder.exists() { "is no folder" } else { "does not exist" };
-            let why = format!("the folder {} {what}; create it first", folder.display());
+            // As the caller named it, unless a link leads elsewhere.
+            let named = Some(place::folder(path)).filter(|f| !f.is_dir()).unwrap_or(folder);
+            let name = named.display();
+            let why = if named.exists() {
+                format!("{name} is no folder; name another place")
+            } else {
+                format!("the folder {name} does not exist; create it first")
+            };
             return refuse("create", io::ErrorKind::NotFound, why);
         }
         let (file, partial) = match Partial::create(folder) {

@@ -74,7 +74,7 @@ fn what_cannot_be_written_is_found_out_before_the_work() {
         assert_eq!(files(place.0.path()), before, "{arguments:?}");
     }
     let (_, error) = place.bad(&["replay", "t.arrow", "-o", "file/x.exr"]);
-    assert!(error.contains("the folder file is no folder"), "{error}");
+    assert!(error.contains(": file is no folder"), "{error}");
     let (code, error) = place.bad(&["demo", "--scene", "builtin:ramps", "--json", "gone/x.json"]);
     assert!(code == 1 && !place.path("screendoor-demo/trace.arrow").exists(), "{error}");
     let (code, error) = place.bad(&["reproduce", "-o", "file"]);
@@ -165,4 +165,37 @@ fn a_program_told_to_end_leaves_nothing_half_done() {
         assert_eq!(files(place.0.path()), ["big.arrow"], "{signal}");
         assert_eq!(fs::read(place.path("big.arrow")).unwrap(), b"old");
     }
+}
+
+#[test]
+#[cfg(unix)]
+fn a_full_disk_leaves_the_good_file_and_nothing_else() {
+    let place = Workplace::with_trace();
+    place.good(&["replay", "t.arrow", "-o", "p.exr", "-o", "p.png"]);
+    let before: Vec<_> =
+        ["t.arrow", "p.exr", "p.png"].iter().map(|f| fs::read(place.path(f)).unwrap()).collect();
+    // No file may grow beyond one block of 512 bytes: writes fail as on a full disk.
+    let limited = "trap '' XFSZ; ulimit -f 1; exec \"$PROGRAM\"";
+    for command in [
+        "capture builtin:ramps -o t.arrow --size 200x200",
+        "replay t.arrow -o p.exr",
+        "replay t.arrow --samples 4 -o p.png",
+    ] {
+        let (code, error) = shell(&place, &format!("{limited} {command}"));
+        assert_eq!(code, Some(1), "{command}: {error}");
+        assert!(error.contains("cannot write"), "{error}");
+        assert_eq!(error.trim_end().lines().count(), 1, "{error}");
+    }
+    assert_eq!(files(place.0.path()), ["p.exr", "p.png", "t.arrow"]);
+    for (name, bytes) in ["t.arrow", "p.exr", "p.png"].iter().zip(before) {
+        assert_eq!(fs::read(place.path(name)).unwrap(), bytes);
+    }
+    // A device that is always full, and one that takes everything.
+    if Path::new("/dev/full").exists() {
+        let (code, error) = shell(&place, "exec \"$PROGRAM\" capture builtin:ramps -o /dev/full");
+        assert_eq!(code, Some(1), "{error}");
+        assert!(error.contains("cannot write /dev/full"), "{error}");
+    }
+    assert_eq!(shell(&place, "exec \"$PROGRAM\" capture builtin:ramps -o /dev/null").0, Some(0));
+    assert!(!fs::metadata("/dev/null").unwrap().is_file());
 }
