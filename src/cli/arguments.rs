@@ -1,13 +1,15 @@
 //! Arguments that several commands share, and how they are read.
 
-use std::path::PathBuf;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use crate::cli::console::Console;
+use crate::cli::files::open_trace;
 use crate::design::{Configured, configure};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::param::{Options, parse_setting};
 use crate::trace::{SamplePattern, Trace};
 
@@ -45,6 +47,26 @@ pub(super) fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
         .ok_or_else(|| format!("'{text}' is not {N} numbers separated by commas"))
 }
 
+/// Reads a linear colour that a trace can hold.
+pub(super) fn colour(text: &str) -> Result<[f64; 3], String> {
+    let colour = numbers::<3>(text)?;
+    let holds = colour.iter().all(|c| (0.0..=65504.0).contains(c));
+    holds.then_some(colour).ok_or_else(|| {
+        format!("'{text}' is no colour; each channel is 0 to 65504, the range of half precision")
+    })
+}
+
+/// The name of a scene as text, and its path where it is a file.
+pub(super) fn scene(name: &OsStr) -> Result<(&str, Option<&Path>)> {
+    let Some(text) = name.to_str() else {
+        return Err(Error::config(
+            format_args!("the scene's name {} is not UTF-8", name.display()),
+            "rename the file or its folder",
+        ));
+    };
+    Ok((text, (!text.starts_with("builtin:")).then(|| Path::new(text))))
+}
+
 fn setting(text: &str) -> Result<(String, String), String> {
     parse_setting(text).map_err(|e| e.to_string())
 }
@@ -74,22 +96,23 @@ pub(super) struct RunArguments {
     #[command(flatten)]
     design: DesignArguments,
     /// Samples per pixel; the trace's own count where not given
-    #[arg(long, value_name = "N", value_parser = samples)]
+    #[arg(long, value_name = "N", value_parser = samples, allow_negative_numbers = true)]
     samples: Option<u32>,
     /// The run's seed: one seed names one picture
-    #[arg(long, default_value_t = 0, value_name = "N")]
+    #[arg(long, default_value_t = 0, value_name = "N", allow_negative_numbers = true)]
     pub seed: u32,
 }
 
 impl RunArguments {
+    /// The trace's path.
+    pub fn path(&self) -> &Path {
+        &self.trace
+    }
+
     /// The design, the open trace, and the sample count, each checked.
     pub fn open(&self, console: &Console) -> Result<(Configured, Trace, u32)> {
         let design = self.design.configure()?;
-        let trace = Trace::open(&self.trace)?;
-        if !trace.is_sealed() {
-            console
-                .warn(&format!("{}: written without checksums by another program", trace.place()));
-        }
+        let trace = open_trace(&self.trace, console)?;
         let pattern = &trace.header().pattern;
         let samples = self.samples.unwrap_or(pattern.samples());
         pattern.prefix(samples)?;
@@ -109,6 +132,8 @@ mod tests {
         }
         assert_eq!(numbers::<2>("30, -20.5"), Ok([30.0, -20.5]));
         assert!(numbers::<2>("30").is_err() && numbers::<2>("nan,1").is_err());
+        assert!(colour("0,1,65504").is_ok());
+        assert!(colour("1e38,0,0").is_err() && colour("-1,0,0").is_err());
         assert_eq!(samples("64"), Ok(64));
         assert!(samples("0").is_err() && samples("128").is_err());
     }

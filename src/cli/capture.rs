@@ -1,22 +1,27 @@
 //! `screendoor capture`.
 
-use std::path::PathBuf;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
 use crate::capture::{CameraOptions, Capture, CaptureOptions, Faces, Order, PatternKind};
-use crate::cli::arguments::{numbers, option, samples, size};
+use crate::cli::arguments::{self, colour, numbers, option, samples, size};
 use crate::cli::console::{Console, grouped};
-use crate::error::Result;
+use crate::cli::files::{check, shown};
+use crate::error::{Error, Result};
+use crate::output::OutputFile;
 use crate::scene;
-use crate::trace::{ColourFormat, Compression, TraceWriter, WriteOptions};
+use crate::trace::{
+    ColourFormat, ColumnId, Compression, Header, Scalar, TraceWriter, WriteOptions,
+};
 
 /// Draw a scene and record its fragments as a trace
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// A .obj, .gltf or .glb file, or builtin:NAME[:parameter=value,…]
     /// ('screendoor scenes' lists them)
-    scene: String,
+    scene: OsString,
     /// The trace to write
     #[arg(long, short, value_name = "TRACE")]
     output: PathBuf,
@@ -24,13 +29,13 @@ pub(super) struct Arguments {
     #[arg(long, default_value = "800x800", value_name = "WxH", value_parser = size)]
     size: (u32, u32),
     /// Samples per pixel; a trace of 64 serves every smaller count too
-    #[arg(long, default_value = "64", value_name = "N", value_parser = samples)]
+    #[arg(long, default_value = "64", value_name = "N", value_parser = samples, allow_negative_numbers = true)]
     samples: u32,
     /// Where the samples lie
     #[arg(long, default_value = "auto", value_parser = option::<PatternKind>())]
     pattern: PatternKind,
     /// Opacity in place of the materials' own; texture alphas still multiply it
-    #[arg(long, value_name = "A")]
+    #[arg(long, value_name = "A", allow_negative_numbers = true)]
     alpha: Option<f32>,
     /// A PNG or JPEG for surfaces that have no texture
     #[arg(long, value_name = "FILE")]
@@ -42,7 +47,7 @@ pub(super) struct Arguments {
     #[arg(long, default_value = "api", value_parser = option::<Order>())]
     order: Order,
     /// Which shuffle --order random takes
-    #[arg(long, default_value_t = 0, value_name = "N")]
+    #[arg(long, default_value_t = 0, value_name = "N", allow_negative_numbers = true)]
     order_seed: u32,
     /// Which sides of surfaces are drawn
     #[arg(long, default_value = "material", value_parser = option::<Faces>())]
@@ -51,13 +56,13 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "YAW,PITCH", value_parser = numbers::<2>, allow_hyphen_values = true)]
     angle: Option<[f64; 2]>,
     /// Camera: distance in radii of the scene; framed on it where not given
-    #[arg(long, value_name = "RADII")]
+    #[arg(long, value_name = "RADII", allow_negative_numbers = true)]
     distance: Option<f64>,
     /// Camera: vertical field of view in degrees; 0 for parallel lines
-    #[arg(long, value_name = "DEGREES")]
+    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
     fov: Option<f64>,
-    /// Linear colour behind the scene
-    #[arg(long, value_name = "R,G,B", value_parser = numbers::<3>, allow_hyphen_values = true)]
+    /// Linear colour behind the scene, each channel 0 to 65504
+    #[arg(long, value_name = "R,G,B", value_parser = colour, allow_hyphen_values = true)]
     background: Option<[f64; 3]>,
     /// Keep colours in single precision, not in half
     #[arg(long)]
@@ -68,7 +73,17 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
-    let mut scene = scene::load(&arguments.scene)?;
+    let (source, path) = arguments::scene(&arguments.scene)?;
+    if arguments.output == Path::new("-") {
+        return Err(Error::config(
+            "a trace cannot go to standard output",
+            "name a file (./- for one that is called so)",
+        ));
+    }
+    let inputs: Vec<&Path> = path.into_iter().chain(arguments.texture.as_deref()).collect();
+    check(&inputs, &[&arguments.output])?;
+    let file = OutputFile::create(&arguments.output)?;
+    let mut scene = scene::load(source)?;
     if let Some(texture) = &arguments.texture {
         scene.apply_texture(texture)?;
     }
@@ -98,20 +113,31 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     };
     let capture = Capture::new(&scene, &options)?;
     let write = WriteOptions { compression: arguments.compress, ..WriteOptions::default() };
-    let mut writer = TraceWriter::create(&arguments.output, capture.header().clone(), write)?;
+    let place = arguments.output.display().to_string();
+    let mut writer = TraceWriter::new(file, &place, capture.header().clone(), write)?;
     let progress = console.progress("capturing", "triangles");
     capture.draw(&mut writer, |done, total| progress.set(done, total))?;
     drop(progress);
     let (file, written) = writer.finish()?;
     file.commit()?;
     if written.rows == 0 {
-        console.warn("the trace has no fragments: nothing of the scene is in sight");
+        console.warn(&format!("the trace has no fragments: {}", why_empty(capture.header())));
     }
     console.print(format_args!(
         "{}: {} fragments, {:.1} MB, content {}",
-        arguments.output.display(),
+        shown(place),
         grouped(written.rows),
         written.bytes as f64 / 1e6,
         &written.content[..16],
     ))
+}
+
+/// Why nothing was drawn, as far as it is known.
+pub(super) fn why_empty(header: &Header) -> &'static str {
+    match header.constants.get(&ColumnId::Alpha) {
+        // What is next to transparent is not recorded: half a step of 16 bits.
+        Some(Scalar::Real(alpha)) if *alpha < 1.0 / 65536.0 => "all of the scene is transparent",
+        Some(_) => "nothing of the scene is in sight",
+        None => "nothing of the scene is in sight, or all of that is transparent",
+    }
 }

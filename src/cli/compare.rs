@@ -1,13 +1,14 @@
 //! `screendoor compare`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
 use crate::cli::console::Console;
+use crate::cli::files::{Json, check, report};
 use crate::error::{Error, Result};
 use crate::metrics::{Errors, Region, errors};
-use crate::picture::{Layer, read, write_exr};
+use crate::picture::{Layer, Picture, PictureFile, read};
 
 /// Compare two pictures (EXR, or PNG as sRGB): the first minus the second
 #[derive(Debug, Args)]
@@ -27,7 +28,7 @@ pub(super) struct Arguments {
     output: Option<PathBuf>,
     /// Write the figures as JSON to a file, or to standard output for -
     #[arg(long, value_name = "FILE")]
-    json: Option<String>,
+    json: Option<PathBuf>,
 }
 
 #[derive(serde::Serialize)]
@@ -41,6 +42,12 @@ struct Document {
 }
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
+    let outputs: Vec<&Path> =
+        arguments.output.as_deref().into_iter().chain(Json::path(&arguments.json)).collect();
+    check(&[&arguments.picture, &arguments.reference], &outputs)?;
+    if let Some(path) = &arguments.output {
+        check_difference(path)?;
+    }
     let layer = arguments.layer.as_deref();
     let a = read(&arguments.picture, layer)?;
     let b = read(&arguments.reference, arguments.reference_layer.as_deref().or(layer))?;
@@ -58,31 +65,66 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
             "compare pictures of one size",
         ));
     }
+    check_finite(&arguments.picture, &a)?;
+    check_finite(&arguments.reference, &b)?;
+    let create = |path| PictureFile::create(path, a.width(), a.height());
+    let output = arguments.output.as_ref().map(create).transpose()?;
+    let json = Json::open(&arguments.json)?;
     let e = errors(&a, &b, &Region::frame(a.grid()));
     let identical = a.hash() == b.hash();
-    if let Some(path) = &arguments.output {
+    let saved = output.map_or(Ok(()), |mut file| {
         let difference = a.zip(&b, |a, b| std::array::from_fn(|i| a[i] - b[i]));
-        write_exr(path, &[Layer { name: "error", picture: &difference }])?;
+        file.write(&[Layer { name: "error", picture: &difference }])?;
+        file.commit()
+    });
+    let document = Document {
+        picture: arguments.picture.display().to_string(),
+        reference: arguments.reference.display().to_string(),
+        width: a.width(),
+        height: a.height(),
+        identical,
+        errors: e,
+    };
+    let reported = report(json, &document, console, || {
+        let line = |name: &str, value: f64| console.print(format_args!("{name:<22}{value:>12.4}"));
+        console.print(format_args!("errors in 8-bit units over {} pixels", e.pixels))?;
+        line("RMSE, linear", e.rmse)?;
+        line("RMSE, sRGB-encoded", e.rmse_srgb)?;
+        line("mean difference", e.mean)?;
+        line("largest difference", e.max)?;
+        if identical {
+            console.print(format_args!("the pictures are identical, bit for bit"))?;
+        }
+        Ok(())
+    });
+    saved.and(reported)
+}
+
+/// A difference has values below 0, which a PNG cannot hold.
+fn check_difference(path: &Path) -> Result<()> {
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("exr")) {
+        return Ok(());
     }
-    if let Some(path) = &arguments.json {
-        let document = Document {
-            picture: arguments.picture.display().to_string(),
-            reference: arguments.reference.display().to_string(),
-            width: a.width(),
-            height: a.height(),
-            identical,
-            errors: e,
-        };
-        return console.json(path, &document);
+    Err(Error::config(
+        format_args!(
+            "cannot write a difference, which has negative values, as '{}'",
+            path.display()
+        ),
+        "name a .exr file",
+    ))
+}
+
+/// Nothing can be said of the error of what is no number.
+fn check_finite(path: &Path, picture: &Picture) -> Result<()> {
+    match picture.not_finite() {
+        0 => Ok(()),
+        n => Err(Error::invalid(
+            path.display(),
+            format_args!(
+                "{n} of its {} pixels are NaN or infinite",
+                u64::from(picture.width()) * u64::from(picture.height())
+            ),
+            "compare pictures that are finite everywhere",
+        )),
     }
-    let line = |name: &str, value: f64| console.print(format_args!("{name:<22}{value:>12.4}"));
-    console.print(format_args!("errors in 8-bit units over {} pixels", e.pixels))?;
-    line("RMSE, linear", e.rmse)?;
-    line("RMSE, sRGB-encoded", e.rmse_srgb)?;
-    line("mean difference", e.mean)?;
-    line("largest difference", e.max)?;
-    if identical {
-        console.print(format_args!("the pictures are identical, bit for bit"))?;
-    }
-    Ok(())
 }

@@ -1,38 +1,64 @@
 //! What the user sees: output, progress, warnings, tables.
 
+use std::cell::Cell;
 use std::fmt::Arguments;
 use std::io::{self, Write};
-use std::path::Path;
 
 use comfy_table::{CellAlignment, Table, presets};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use serde::Serialize;
 
+use crate::cli::files::shown;
 use crate::error::{Error, Result};
-use crate::output::OutputFile;
 
 /// The user's terminal.
 #[derive(Debug)]
 pub(super) struct Console {
     quiet: bool,
+    failed: Cell<bool>,
+}
+
+const TO_OUTPUT: &str = "write to";
+
+/// Whether the reader of our output has seen enough: no error.
+pub(super) fn nobody_reads(error: &Error) -> bool {
+    matches!(error, Error::Io { action: TO_OUTPUT, source, .. }
+        if source.kind() == io::ErrorKind::BrokenPipe)
 }
 
 impl Console {
     pub fn new(quiet: bool) -> Self {
-        Console { quiet }
+        Console { quiet, failed: Cell::new(false) }
     }
 
-    /// Prints a line to standard output.
-    pub fn print(&self, line: Arguments<'_>) -> Result<()> {
-        let written = writeln!(io::stdout().lock(), "{line}");
-        written.map_err(|e| Error::io("write to", "standard output", e))
+    /// Prints text to standard output, and a line's end. Of control characters
+    /// only line ends are obeyed.
+    pub fn print(&self, text: Arguments<'_>) -> Result<()> {
+        let lines: String = text.to_string().split('\n').map(|l| shown(l) + "\n").collect();
+        self.write(lines.as_bytes())
+    }
+
+    /// Writes bytes to standard output as they are.
+    pub fn write(&self, bytes: &[u8]) -> Result<()> {
+        let written = io::stdout().lock().write_all(bytes);
+        written.map_err(|e| Error::io(TO_OUTPUT, "standard output", e))
+    }
+
+    /// Prints an error to standard error; the program will end with a failure.
+    pub fn error(&self, error: &Error) {
+        self.failed.set(true);
+        // Where standard error is closed there is nobody to tell.
+        let _ = writeln!(io::stderr().lock(), "screendoor: error: {}", shown(error));
+    }
+
+    /// Whether an error has been printed.
+    pub fn has_failed(&self) -> bool {
+        self.failed.get()
     }
 
     /// Prints a warning to standard error.
     pub fn warn(&self, text: &str) {
         if !self.quiet {
-            // Where standard error is closed there is nobody to tell.
-            let _ = writeln!(io::stderr().lock(), "screendoor: warning: {text}");
+            let _ = writeln!(io::stderr().lock(), "screendoor: warning: {}", shown(text));
         }
     }
 
@@ -51,16 +77,6 @@ impl Console {
         );
         bar.set_prefix(what.to_string());
         Progress { bar }
-    }
-
-    /// Writes `value` as JSON to `path`, or to standard output for `-`.
-    pub fn json(&self, path: &str, value: &impl Serialize) -> Result<()> {
-        let text = serde_json::to_string_pretty(value)
-            .map_err(|e| Error::io("write", path, io::Error::other(e)))?;
-        if path == "-" {
-            return self.print(format_args!("{text}"));
-        }
-        OutputFile::put(Path::new(path), format!("{text}\n").as_bytes())
     }
 }
 

@@ -1,20 +1,27 @@
 //! `screendoor demo`.
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use serde::Serialize;
 
 use crate::capture::{Capture, CaptureOptions};
+use crate::cli::arguments;
+use crate::cli::capture::why_empty;
 use crate::cli::console::{Console, grouped, table};
-use crate::design::configure;
+use crate::cli::files::{Json, check, report, shown};
+use crate::design::{Configured, configure};
 use crate::error::{Error, Result};
-use crate::picture::{Layer, write_exr, write_png};
+use crate::output::OutputFile;
+use crate::picture::{Layer, PictureFile};
 use crate::scene;
-use crate::study::{Measured, Plan, measure};
+use crate::study::{Measured, Measurements, Plan, Run, measure};
 use crate::trace::{Trace, TraceWriter, WriteOptions};
 
 /// Do the main job on a built-in scene: capture it, replay it through 'lk' and
-/// 'enderton' at 4, 8 and 16 samples, hold them against 'exact'
+/// through 'enderton', stratified and naive, at 4, 8 and 16 samples, hold them
+/// against 'exact'
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// Where the trace and the pictures go
@@ -22,29 +29,57 @@ pub(super) struct Arguments {
     output: PathBuf,
     /// The scene
     #[arg(long, default_value = "builtin:engine", value_name = "SCENE")]
-    scene: String,
+    scene: OsString,
+    /// Write the figures as JSON to a file, or to standard output for -
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
 }
 
 const SAMPLES: [u32; 3] = [4, 8, 16];
-const DESIGNS: [&str; 2] = ["lk", "enderton"];
+/// The proposal, what it is held against, and what it improves on.
+const DESIGNS: [&str; 3] = ["lk", "enderton", "enderton:mask=naive"];
 const SIDE: u32 = 512;
 const SEEDS: u32 = 4;
 
+#[derive(Serialize)]
+struct Document<'a> {
+    scene: &'a str,
+    content: Option<&'a str>,
+    fragments: u64,
+    width: u32,
+    height: u32,
+    runs: Vec<&'a Run>,
+}
+
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let folder = &arguments.output;
-    std::fs::create_dir_all(folder).map_err(|e| Error::io("create", folder, e))?;
-    let path = folder.join("trace.arrow");
-    let fragments = capture(&arguments.scene, &path, console)?;
-    console.print(format_args!(
-        "captured {} at {SIDE}x{SIDE}: {} fragments in {}",
-        arguments.scene,
-        grouped(fragments),
-        path.display()
-    ))?;
-
-    let trace = Trace::open(&path)?;
-    let designs = DESIGNS.map(|d| configure(d, &[])).into_iter().collect::<Result<_>>()?;
+    let (source, scene_path) = arguments::scene(&arguments.scene)?;
+    let designs = DESIGNS.map(|d| configure(d, &[])).into_iter().collect::<Result<Vec<_>>>()?;
     let plan = Plan { designs, samples: SAMPLES.to_vec(), seeds: SEEDS };
+    let path = folder.join("trace.arrow");
+    // Before the check: names of files are compared within folders that exist.
+    std::fs::create_dir_all(folder).map_err(|e| Error::io("create", folder, e))?;
+    let names = picture_paths(folder, &plan.designs);
+    let outputs = names.iter().chain([&path]).map(|p| &**p).chain(Json::path(&arguments.json));
+    check(scene_path.as_slice(), &outputs.collect::<Vec<_>>())?;
+    let file = OutputFile::create(&path)?;
+    let create = |path| PictureFile::create(path, SIDE, SIDE);
+    let files = names.iter().map(create).collect::<Result<Vec<_>>>()?;
+    let json = Json::open(&arguments.json)?;
+    // Standard output holds either JSON or text.
+    let say = |text: std::fmt::Arguments<'_>| match json {
+        Some(Json::Standard) => Ok(()),
+        _ => console.print(text),
+    };
+
+    let fragments = capture(source, file, console)?;
+    say(format_args!(
+        "captured {} at {SIDE}x{SIDE}: {} fragments in {}",
+        shown(source),
+        grouped(fragments),
+        shown(path.display())
+    ))?;
+    let trace = Trace::open(&path)?;
     let progress = console.progress("replaying", "replays");
     let measured = measure(&trace, &plan, 512 << 20, |what, done, total| {
         progress.name(what);
@@ -52,51 +87,110 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     })?;
     drop(progress);
 
-    console.print(format_args!(
+    say(format_args!(
         "\nerror against exact, RMSE in 8-bit units of the pixels that hold fragments, {SEEDS} seeds"
     ))?;
-    console.print(format_args!("{}", error_table(&measured.runs)))?;
-
-    for (samples, reference) in SAMPLES.iter().zip(&measured.references) {
-        for m in measured.runs.iter().filter(|m| m.run.samples == *samples) {
-            let name = format!("{}-{samples}", m.run.design);
-            write_png(folder.join(format!("{name}.png")), &m.picture)?;
-            let error = m.picture.zip(reference, |a, b| std::array::from_fn(|i| a[i] - b[i]));
-            let layers = [
-                Layer { name: "colour", picture: &m.picture },
-                Layer { name: "reference", picture: reference },
-                Layer { name: "error", picture: &error },
-            ];
-            write_exr(folder.join(format!("{name}.exr")), &layers)?;
-        }
+    say(format_args!("{}", error_table(&measured.runs)))?;
+    if let Some(comparison) = comparison(&measured.runs) {
+        say(format_args!("\n{comparison}"))?;
     }
-    if let Some(reference) = measured.references.last() {
-        write_png(folder.join("exact.png"), reference)?;
+    let saved = save(files, &measured);
+    if saved.is_ok() {
+        say(format_args!(
+            "\npictures are in {0}/ (.png to look at, .exr with the layers colour, reference and \
+             error)\n\
+             next: screendoor info {1}; screendoor explain {1} --pixel {2},{2} --samples 8",
+            shown(folder.display()),
+            shown(path.display()),
+            SIDE / 2
+        ))?;
     }
-    console.print(format_args!(
-        "\npictures are in {0}/ (.png to look at, .exr with the layers colour, reference and error)\n\
-         next: screendoor info {1}; screendoor explain {1} --pixel {2},{2} --samples 8",
-        folder.display(),
-        path.display(),
-        SIDE / 2
-    ))
+    let document = Document {
+        scene: source,
+        content: trace.content(),
+        fragments,
+        width: SIDE,
+        height: SIDE,
+        runs: measured.runs.iter().map(|m| &m.run).collect(),
+    };
+    // The text has been printed.
+    saved.and(json.map_or(Ok(()), |json| report(Some(json), &document, console, || Ok(()))))
 }
 
-fn capture(source: &str, path: &Path, console: &Console) -> Result<u64> {
+/// Names that every file system takes.
+fn file_name(design: &str, samples: u32) -> String {
+    format!("{}-{samples}", design.replace([':', '=', ','], "-"))
+}
+
+/// The demo's pictures: two files a run, run after run, and the exact one.
+fn picture_paths(folder: &Path, designs: &[Configured]) -> Vec<PathBuf> {
+    let mut paths = Vec::new();
+    for samples in SAMPLES {
+        for design in designs {
+            let name = file_name(&design.label(), samples);
+            paths.extend(["png", "exr"].map(|ending| folder.join(format!("{name}.{ending}"))));
+        }
+    }
+    paths.push(folder.join("exact.png"));
+    paths
+}
+
+/// Writes the pictures, in the order of [`picture_paths`].
+fn save(mut files: Vec<PictureFile>, measured: &Measurements) -> Result<()> {
+    let mut rest = files.iter_mut();
+    for m in &measured.runs {
+        let at = SAMPLES.iter().position(|s| *s == m.run.samples).expect("a sample count of ours");
+        let reference = &measured.references[at];
+        let error = m.picture.zip(reference, |a, b| std::array::from_fn(|i| a[i] - b[i]));
+        let layers = [
+            Layer { name: "colour", picture: &m.picture },
+            Layer { name: "reference", picture: reference },
+            Layer { name: "error", picture: &error },
+        ];
+        rest.by_ref().take(2).try_for_each(|file| file.write(&layers))?;
+    }
+    if let (Some(file), Some(reference)) = (rest.next(), measured.references.last()) {
+        file.write(&[Layer { name: "colour", picture: reference }])?;
+    }
+    files.into_iter().try_for_each(PictureFile::commit)
+}
+
+fn capture(source: &str, file: OutputFile, console: &Console) -> Result<u64> {
     let scene = scene::load(source)?;
     for warning in &scene.warnings {
         console.warn(warning);
     }
     let options = CaptureOptions { width: SIDE, height: SIDE, ..CaptureOptions::default() };
     let capture = Capture::new(&scene, &options)?;
-    let header = capture.header().clone();
-    let mut writer = TraceWriter::create(path, header, WriteOptions::default())?;
+    let (header, place) = (capture.header().clone(), file.path().display().to_string());
+    let mut writer = TraceWriter::new(file, &place, header, WriteOptions::default())?;
     let progress = console.progress("capturing", "triangles");
     capture.draw(&mut writer, |done, total| progress.set(done, total))?;
     drop(progress);
     let (file, written) = writer.finish()?;
     file.commit()?;
+    if written.rows == 0 {
+        console.warn(&format!("the trace has no fragments: {}", why_empty(capture.header())));
+    }
     Ok(written.rows)
+}
+
+/// What the table's last rows say of the claim: LK against what it improves on.
+fn comparison(runs: &[Measured]) -> Option<String> {
+    let samples = SAMPLES[SAMPLES.len() - 1];
+    let noise = |design: &str| {
+        let run = runs.iter().find(|m| m.run.design == design && m.run.samples == samples)?;
+        Some(run.run.covered.rmse.value).filter(|_| run.run.covered.pixels > 0)
+    };
+    let [lk, stratified, naive] = DESIGNS.map(noise);
+    let (by_stratified, by_naive) = (lk? / stratified?, lk? / naive?);
+    (by_stratified.is_finite() && by_naive.is_finite()).then(|| {
+        format!(
+            "at {samples} samples lk has {by_naive:.2} of the noise (RMSE) of naive stochastic \
+             transparency\n(enderton:mask=naive), and {by_stratified:.2} of that of the \
+             stratified one (enderton)"
+        )
+    })
 }
 
 fn error_table(runs: &[Measured]) -> comfy_table::Table {
@@ -114,16 +208,18 @@ fn error_table(runs: &[Measured]) -> comfy_table::Table {
     let rows = runs.iter().map(|m| {
         let (run, e) = (&m.run, &m.run.covered);
         let fragments = run.events.fragments as f64;
+        // Where there is no fragment there is nothing to say of one.
+        let known = |text: String| if run.events.fragments == 0 { "-".to_string() } else { text };
         let [read, written] = run.events.state_bytes();
         vec![
             run.design.clone(),
             run.samples.to_string(),
-            format!("{:.2} ± {:.2}", e.rmse.value, e.rmse.half_width()),
-            format!("{:.2}", e.rmse_srgb.value),
-            format!("{:+.3}", e.mean.value),
-            format!("{:.1} M", fragments / run.seconds / 1e6),
-            format!("{:.2}", run.events.hashes as f64 / fragments),
-            format!("{:.1}", (read + written) as f64 / fragments),
+            known(format!("{:.2} ± {:.2}", e.rmse.value, e.rmse.half_width())),
+            known(format!("{:.2}", e.rmse_srgb.value)),
+            known(format!("{:+.3}", e.mean.value)),
+            known(format!("{:.1} M", fragments / run.seconds / 1e6)),
+            known(format!("{:.2}", run.events.hashes as f64 / fragments)),
+            known(format!("{:.1}", (read + written) as f64 / fragments)),
             run.state_bits.total().to_string(),
         ]
     });

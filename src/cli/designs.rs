@@ -1,9 +1,12 @@
 //! `screendoor designs`.
 
+use std::path::PathBuf;
+
 use clap::Args;
 
 use crate::cli::console::Console;
-use crate::design::DESIGNS;
+use crate::cli::files::{Json, report};
+use crate::design::{DESIGNS, Entry};
 use crate::error::Result;
 use crate::param::{Kind, Param};
 use crate::rop::{Info, Promises};
@@ -13,7 +16,7 @@ use crate::rop::{Info, Promises};
 pub(super) struct Arguments {
     /// Write the list as JSON to a file, or to standard output for -
     #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
-    json: Option<String>,
+    json: Option<PathBuf>,
 }
 
 #[derive(serde::Serialize)]
@@ -25,17 +28,17 @@ struct Document {
 }
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
-    if let Some(path) = &arguments.json {
-        let document = |entry: &crate::design::Entry| -> Result<Document> {
-            Ok(Document { info: entry.info, promises: entry.configure(&[])?.promises() })
-        };
-        let documents = DESIGNS.iter().map(document).collect::<Result<Vec<_>>>()?;
-        return console.json(path, &documents);
-    }
-    for entry in DESIGNS {
-        let info = &entry.info;
+    let json = Json::open(&arguments.json)?;
+    let document = |entry: &Entry| -> Result<Document> {
+        Ok(Document { info: entry.info, promises: entry.configure(&[])?.promises() })
+    };
+    let documents = DESIGNS.iter().map(document).collect::<Result<Vec<_>>>()?;
+    report(json, &documents, console, || print(&documents, console))
+}
+
+fn print(documents: &[Document], console: &Console) -> Result<()> {
+    for Document { info, promises: p } in documents {
         console.print(format_args!("{}\n  {}\n  {}", info.name, info.summary, info.citation))?;
-        let p = entry.configure(&[])?.promises();
         let list = [
             (p.unbiased, "unbiased"),
             (p.consistent, "consistent"),

@@ -1,9 +1,12 @@
 //! `screendoor explain`.
 
+use std::path::{Path, PathBuf};
+
 use clap::Args;
 
 use crate::cli::arguments::{RunArguments, numbers};
 use crate::cli::console::Console;
+use crate::cli::files::{Json, check, report, shown};
 use crate::error::{Error, Result};
 use crate::param::Values;
 use crate::rop::{Contents, Explanation, Site, Step};
@@ -15,14 +18,14 @@ pub(super) struct Arguments {
     #[command(flatten)]
     run: RunArguments,
     /// The pixel: column and row from the top left
-    #[arg(long, value_name = "X,Y", value_parser = numbers::<2>)]
+    #[arg(long, value_name = "X,Y", value_parser = numbers::<2>, allow_hyphen_values = true)]
     pixel: [f64; 2],
     /// Show only the last N fragments
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     last: Option<usize>,
     /// Write it as JSON to a file, or to standard output for -
     #[arg(long, value_name = "FILE")]
-    json: Option<String>,
+    json: Option<PathBuf>,
 }
 
 #[derive(serde::Serialize)]
@@ -38,6 +41,8 @@ struct Document<'a> {
 }
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
+    let outputs: Vec<&Path> = Json::path(&arguments.json).into_iter().collect();
+    check(&[arguments.run.path()], &outputs)?;
     let (design, trace, samples) = arguments.run.open(console)?;
     let seed = arguments.run.seed;
     let coordinate = |v: f64| {
@@ -47,46 +52,46 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         })
     };
     let site = Site { x: coordinate(arguments.pixel[0])?, y: coordinate(arguments.pixel[1])? };
+    let json = Json::open(&arguments.json)?;
     let progress = console.progress("searching", "fragments");
-    let report = |done, total| progress.set(done, total);
-    let mut explanation = design.explain(&trace, samples, seed, site, &report)?;
+    let watch = |done, total| progress.set(done, total);
+    let mut explanation = design.explain(&trace, samples, seed, site, &watch)?;
     drop(progress);
     let all = explanation.steps.len();
     let left_out = arguments.last.map_or(0, |last| all.saturating_sub(last));
     let before = explanation.steps.drain(..left_out).next_back().map(|step| step.contents);
-    if let Some(path) = &arguments.json {
-        let document = Document {
-            trace: trace.place(),
-            design: design.info().name,
-            parameters: design.values(),
-            pixel: [site.x, site.y],
-            samples,
-            seed,
-            explanation: &explanation,
-        };
-        return console.json(path, &document);
-    }
-    console.print(format_args!(
-        "{} at pixel {},{} of {}: {samples} samples, seed {}",
-        design.label(),
-        site.x,
-        site.y,
-        trace.place(),
-        seed
-    ))?;
-    if all == 0 {
-        console.print(format_args!("no fragment of the trace covers this pixel"))?;
-    }
-    if left_out > 0 {
-        console.print(format_args!("… {left_out} fragments before"))?;
-    }
-    let mut before = before.unwrap_or_else(|| explanation.cleared.clone());
-    for (i, step) in explanation.steps.iter().enumerate() {
-        print_step(left_out + i + 1, all, step, &before, console)?;
-        before = step.contents.clone();
-    }
-    let [r, g, b] = explanation.colour;
-    console.print(format_args!("resolved: {r:.5} {g:.5} {b:.5}"))
+    let document = Document {
+        trace: trace.place(),
+        design: design.info().name,
+        parameters: design.values(),
+        pixel: [site.x, site.y],
+        samples,
+        seed,
+        explanation: &explanation,
+    };
+    report(json, &document, console, || {
+        console.print(format_args!(
+            "{} at pixel {},{} of {}: {samples} samples, seed {}",
+            design.label(),
+            site.x,
+            site.y,
+            shown(trace.place()),
+            seed
+        ))?;
+        if all == 0 {
+            console.print(format_args!("no fragment of the trace covers this pixel"))?;
+        }
+        if left_out > 0 {
+            console.print(format_args!("… {left_out} fragments before"))?;
+        }
+        let mut before = before.unwrap_or_else(|| explanation.cleared.clone());
+        for (i, step) in explanation.steps.iter().enumerate() {
+            print_step(left_out + i + 1, all, step, &before, console)?;
+            before = step.contents.clone();
+        }
+        let [r, g, b] = explanation.colour;
+        console.print(format_args!("resolved: {r:.5} {g:.5} {b:.5}"))
+    })
 }
 
 fn list(mask: SampleMask) -> String {

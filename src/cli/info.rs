@@ -1,10 +1,11 @@
 //! `screendoor info`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
 use crate::cli::console::{Console, grouped};
+use crate::cli::files::{Json, check, open_trace, report, shown};
 use crate::error::Result;
 use crate::trace::{Header, Statistics, Trace, statistics};
 
@@ -15,7 +16,7 @@ pub(super) struct Arguments {
     trace: PathBuf,
     /// Write the figures as JSON to a file, or to standard output for -
     #[arg(long, value_name = "FILE")]
-    json: Option<String>,
+    json: Option<PathBuf>,
 }
 
 #[derive(serde::Serialize)]
@@ -29,10 +30,10 @@ struct Document<'a> {
 }
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
-    let trace = Trace::open(&arguments.trace)?;
-    if !trace.is_sealed() {
-        console.warn(&format!("{}: written without checksums by another program", trace.place()));
-    }
+    let outputs: Vec<&Path> = Json::path(&arguments.json).into_iter().collect();
+    check(&[&arguments.trace], &outputs)?;
+    let trace = open_trace(&arguments.trace, console)?;
+    let json = Json::open(&arguments.json)?;
     let progress = console.progress("counting", "fragments");
     let mut done = 0;
     let stats = statistics(&trace, |rows| {
@@ -40,29 +41,25 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         progress.set(done, trace.rows());
     })?;
     drop(progress);
-    match &arguments.json {
-        Some(path) => console.json(
-            path,
-            &Document {
-                trace: trace.place().to_string(),
-                header: trace.header(),
-                content: trace.content(),
-                row_bytes: trace.header().row_bytes(),
-                batches: trace.batch_count(),
-                statistics: &stats,
-            },
-        ),
-        None => print(&trace, &stats, console),
-    }
+    let document = Document {
+        trace: trace.place().to_string(),
+        header: trace.header(),
+        content: trace.content(),
+        row_bytes: trace.header().row_bytes(),
+        batches: trace.batch_count(),
+        statistics: &stats,
+    };
+    report(json, &document, console, || print(&trace, &stats, console))
 }
 
 fn print(trace: &Trace, stats: &Statistics, console: &Console) -> Result<()> {
-    let line = |name: &str, value: String| console.print(format_args!("{name:<18}{value}"));
+    let line =
+        |name: &str, value: String| console.print(format_args!("{name:<18}{}", shown(value)));
     let header = trace.header();
     let share = |part: u64, whole: u64| {
         if whole == 0 { 0.0 } else { 100.0 * part as f64 / whole as f64 }
     };
-    console.print(format_args!("{}", trace.place()))?;
+    console.print(format_args!("{}", shown(trace.place())))?;
     line("source", header.source.clone())?;
     line("camera", header.camera.clone())?;
     line("frame", format!("{} x {} pixels", header.width, header.height))?;

@@ -7,10 +7,12 @@ mod console;
 mod demo;
 mod designs;
 mod explain;
+mod files;
 mod info;
 mod replay;
 mod reproduce;
 mod scenes;
+mod signals;
 mod verify;
 
 use std::process::ExitCode;
@@ -27,7 +29,7 @@ use crate::error::{Error, Result};
 #[command(name = "screendoor", version, propagate_version = true, subcommand_required = true)]
 struct Arguments {
     /// Threads to use; all processors where not given
-    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, global = true, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
     /// No progress bars and no warnings
     #[arg(long, short, global = true)]
@@ -52,22 +54,21 @@ enum Command {
 
 /// Parses the process's arguments and runs the command.
 ///
-/// Exit codes: 0 for success; 1 where a file is missing, damaged or cannot be
-/// written; 2 where the request itself cannot be.
+/// Exit codes: 0 for success; 1 where something could not be done or a file is
+/// bad; 2 where the command line asks for what cannot be.
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let console = Console::new(arguments.quiet);
+    signals::clean_up();
     match run(&arguments, &console) {
-        Ok(()) => ExitCode::SUCCESS,
-        // The reader of our output has seen enough.
-        Err(Error::Io { source, .. }) if source.kind() == std::io::ErrorKind::BrokenPipe => {
-            ExitCode::SUCCESS
-        }
+        Ok(()) => {}
+        Err(error) if console::nobody_reads(&error) => {}
         Err(error) => {
-            eprintln!("screendoor: error: {error}");
-            ExitCode::from(if error.is_config() { 2 } else { 1 })
+            console.error(&error);
+            return ExitCode::from(if error.is_config() { 2 } else { 1 });
         }
     }
+    ExitCode::from(if console.has_failed() { 1 } else { 0 })
 }
 
 fn run(arguments: &Arguments, console: &Console) -> Result<()> {

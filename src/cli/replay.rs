@@ -8,11 +8,12 @@ use serde::Serialize;
 
 use crate::cli::arguments::RunArguments;
 use crate::cli::console::{Console, grouped};
+use crate::cli::files::{Json, check, report, shown};
 use crate::design::{Configured, REFERENCE, configure};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::metrics::{Ensemble, EnsembleErrors, PixelClasses, Region};
 use crate::param::Values;
-use crate::picture::{Layer, Picture, write_exr, write_png};
+use crate::picture::{Layer, Picture, PictureFile};
 use crate::rop::{EventCounts, Promises, ReplayOptions, Replayed, StateBits};
 use crate::trace::Trace;
 
@@ -23,7 +24,7 @@ pub(super) struct Arguments {
     run: RunArguments,
     /// Replay this many seeds, from --seed on, and tell variance from bias;
     /// implies --exact
-    #[arg(long, default_value_t = 1, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, default_value_t = 1, value_name = "K", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     seeds: u32,
     /// Composite the exact picture too and give the error against it
     #[arg(long)]
@@ -33,12 +34,12 @@ pub(super) struct Arguments {
     output: Vec<PathBuf>,
     /// Write the results as JSON to a file, or to standard output for -
     #[arg(long, value_name = "FILE")]
-    json: Option<String>,
+    json: Option<PathBuf>,
     /// MiB that the exact answer's fragments may take at a time
-    #[arg(long, default_value_t = 512, value_name = "MIB", value_parser = clap::value_parser!(u64).range(1..=1 << 20))]
+    #[arg(long, default_value_t = 512, value_name = "MIB", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=1 << 20))]
     memory: u64,
     /// Fragments that are binned at a time
-    #[arg(long, default_value_t = 1 << 19, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1 << 30))]
+    #[arg(long, default_value_t = 1 << 19, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=1 << 30))]
     window: u64,
 }
 
@@ -71,18 +72,22 @@ struct ErrorsByRegion {
 }
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
-    for path in &arguments.output {
-        check_ending(path)?;
-    }
+    let json = Json::path(&arguments.json);
+    let outputs: Vec<&Path> = arguments.output.iter().map(|o| &**o).chain(json).collect();
+    check(&[arguments.run.path()], &outputs)?;
     let (design, trace, samples) = arguments.run.open(console)?;
+    let header = trace.header();
+    let create = |path| PictureFile::create(path, header.width, header.height);
+    let files = arguments.output.iter().map(create).collect::<Result<Vec<_>>>()?;
+    let json = Json::open(&arguments.json)?;
     let seed = arguments.run.seed;
     let progress = console.progress("replaying", "fragments");
-    let report = |done, total| progress.set(done, total);
+    let watch = |done, total| progress.set(done, total);
     let options = ReplayOptions {
         count_events: true,
         window: arguments.window as usize,
         memory: arguments.memory << 20,
-        progress: &report,
+        progress: &watch,
     };
 
     let start = Instant::now();
@@ -109,70 +114,49 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     };
     drop(progress);
 
-    for path in &arguments.output {
-        write(path, &first.picture, reference.as_ref())?;
-    }
+    let saved = save(files, &first.picture, reference.as_ref());
     let events = first.events.clone().unwrap_or_default();
-    let fragments_per_second = events.fragments as f64 / seconds;
-    if let Some(path) = &arguments.json {
-        let document = Document {
-            trace: trace.place(),
-            content: trace.content(),
-            design: design.info().name,
-            parameters: design.values(),
-            promises: design.promises(),
-            samples,
-            seed,
-            picture: first.picture.hash(),
-            seconds,
-            fragments_per_second,
-            passes: first.passes,
-            state_bits: first.state_bits,
-            touched_tiles: first.touched_tiles,
-            events: &events,
-            errors,
-        };
-        return console.json(path, &document);
-    }
-    console.print(format_args!(
-        "{} at {samples} samples, seed {}: {}",
-        design.label(),
+    let document = Document {
+        trace: trace.place(),
+        content: trace.content(),
+        design: design.info().name,
+        parameters: design.values(),
+        promises: design.promises(),
+        samples,
         seed,
-        trace.place()
-    ))?;
-    console.print(format_args!(
-        "{} fragments in {seconds:.2} s ({:.2} million a second)",
-        grouped(events.fragments),
-        fragments_per_second / 1e6
-    ))?;
-    if let Some(errors) = &errors {
-        print_errors(errors, console)?;
-    }
-    print_events(&first, &events, &design, console)
-}
-
-fn check_ending(path: &Path) -> Result<()> {
-    match path.extension().and_then(|e| e.to_str()) {
-        Some("exr" | "png") => Ok(()),
-        _ => Err(Error::config(
-            format_args!("cannot write a picture as '{}'", path.display()),
-            "name a .exr or .png file",
-        )),
-    }
+        picture: first.picture.hash(),
+        seconds,
+        fragments_per_second: events.fragments as f64 / seconds,
+        passes: first.passes,
+        state_bits: first.state_bits,
+        touched_tiles: first.touched_tiles,
+        events: &events,
+        errors,
+    };
+    let reported = report(json, &document, console, || {
+        let place = shown(trace.place());
+        console
+            .print(format_args!("{} at {samples} samples, seed {seed}: {place}", design.label()))?;
+        print_speed(&document, trace.rows(), console)?;
+        if let Some(errors) = &document.errors {
+            print_errors(errors, console)?;
+        }
+        print_events(&first, &events, &design, console)
+    });
+    saved.and(reported)
 }
 
 /// PNG shows the picture; EXR holds it in layers with the reference and the error.
-fn write(path: &Path, picture: &Picture, reference: Option<&Picture>) -> Result<()> {
-    if path.extension().is_some_and(|e| e == "png") {
-        return write_png(path, picture);
-    }
+/// No file appears unless all could be written.
+fn save(mut files: Vec<PictureFile>, picture: &Picture, reference: Option<&Picture>) -> Result<()> {
     let error = reference.map(|r| picture.zip(r, |a, b| std::array::from_fn(|i| a[i] - b[i])));
     let mut layers = vec![Layer { name: "colour", picture }];
     if let (Some(reference), Some(error)) = (reference, &error) {
         layers.push(Layer { name: "reference", picture: reference });
         layers.push(Layer { name: "error", picture: error });
     }
-    write_exr(path, &layers)
+    files.iter_mut().try_for_each(|file| file.write(&layers))?;
+    files.into_iter().try_for_each(PictureFile::commit)
 }
 
 fn by_region(
@@ -193,11 +177,33 @@ fn by_region(
     Ok(ErrorsByRegion { frame, covered })
 }
 
+fn print_speed(document: &Document<'_>, rows: u64, console: &Console) -> Result<()> {
+    let drawn = document.events.fragments;
+    console.print(format_args!(
+        "{} fragments in {:.2} s ({:.2} million a second)",
+        grouped(drawn),
+        document.seconds,
+        document.fragments_per_second / 1e6
+    ))?;
+    if drawn == rows {
+        return Ok(());
+    }
+    console.print(format_args!(
+        "(of {}: the others cover none of the first {} samples)",
+        grouped(rows),
+        document.samples
+    ))
+}
+
 fn print_errors(errors: &ErrorsByRegion, console: &Console) -> Result<()> {
     let seeds = errors.frame.seeds;
     let of = if seeds > 1 { format!(" of {seeds} seeds, 95 % intervals") } else { String::new() };
     console.print(format_args!("error against exact in 8-bit units{of}"))?;
     for (name, e) in [("frame", &errors.frame), ("covered", &errors.covered)] {
+        if e.pixels == 0 {
+            console.print(format_args!("  {name:<8} no pixel holds a fragment"))?;
+            continue;
+        }
         let spread = |v: f64| if seeds > 1 { format!(" ± {v:.3}") } else { String::new() };
         console.print(format_args!(
             "  {name:<8} RMSE {:.3}{} linear, {:.3}{} sRGB; mean {:+.4}{}; max {:.1}",
@@ -210,8 +216,10 @@ fn print_errors(errors: &ErrorsByRegion, console: &Console) -> Result<()> {
             e.max
         ))?;
         if let (Some(variance), Some(bias)) = (e.variance, e.bias_squared) {
+            // Without a word a negative square looks like a mistake.
+            let why = if bias < 0.0 { " (an unbiased estimate: it scatters around 0)" } else { "" };
             console.print(format_args!(
-                "  {:<8} variance {variance:.3}, squared bias {bias:+.4}",
+                "  {:<8} variance {variance:.3}, squared bias {bias:+.4}{why}",
                 ""
             ))?;
         }

@@ -1,10 +1,12 @@
 //! `screendoor reproduce`.
 
+use std::io;
 use std::path::PathBuf;
 
 use clap::Args;
 
 use crate::cli::console::Console;
+use crate::cli::files::shown;
 use crate::error::{Error, Result};
 use crate::output::OutputFile;
 use crate::picture::write_png;
@@ -22,25 +24,27 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FOLDER")]
     models: Option<PathBuf>,
     /// Seeds of each run of the tables
-    #[arg(long, default_value_t = 4, value_name = "K", value_parser = clap::value_parser!(u32).range(2..=1000))]
+    #[arg(long, default_value_t = 4, value_name = "K", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(2..=1000))]
     seeds: u32,
     /// Seeds of each expectation
-    #[arg(long, default_value_t = 128, value_name = "K", value_parser = clap::value_parser!(u32).range(2..=10_000))]
+    #[arg(long, default_value_t = 128, value_name = "K", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(2..=10_000))]
     seeds_of_means: u32,
     /// Frame side in pixels
-    #[arg(long, default_value_t = 800, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(128..=4096))]
+    #[arg(long, default_value_t = 800, value_name = "PIXELS", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(128..=4096))]
     side: u32,
 }
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     if let Some(models) = arguments.models.as_ref().filter(|m| !m.is_dir()) {
-        return Err(Error::config(
-            format_args!("there is no folder {}", models.display()),
-            "name the folder that holds the models",
-        ));
+        let why = "there is no such folder; name the one that holds the models";
+        return Err(Error::io("read", models, io::Error::new(io::ErrorKind::NotFound, why)));
     }
     let folder = arguments.output.join("figures");
     std::fs::create_dir_all(&folder).map_err(|e| Error::io("create", &folder, e))?;
+    let path = arguments.output.join("RESULTS.md");
+    // The work takes hours: that it can be written is found out before.
+    let mut file = OutputFile::create(&path)?;
+    drop(OutputFile::create(folder.join("figure.png"))?);
     let effort = Effort {
         seeds: arguments.seeds,
         seeds_of_means: arguments.seeds_of_means,
@@ -56,10 +60,19 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         console.warn(&format!("{missing}: not in the models' folder; its table is left out"));
     }
     let pictures = figures(&publications);
-    for (name, picture) in &pictures {
-        write_png(folder.join(format!("{name}.png")), picture)?;
+    let text = results(&publications, "figures");
+    let save = || {
+        for (name, picture) in &pictures {
+            write_png(folder.join(format!("{name}.png")), picture)?;
+        }
+        file.write_bytes(text.as_bytes())?;
+        file.commit()
+    };
+    if let Err(error) = save() {
+        // What has been measured is not lost.
+        console.print(format_args!("{text}"))?;
+        return Err(error);
     }
-    let path = arguments.output.join("RESULTS.md");
-    OutputFile::put(&path, results(&publications, "figures").as_bytes())?;
-    console.print(format_args!("{} and {} figures", path.display(), pictures.len()))
+    let (path, count) = (shown(path.display()), pictures.len());
+    console.print(format_args!("{path} and {count} figures"))
 }

@@ -1,14 +1,15 @@
 //! `screendoor verify`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
 use crate::cli::console::{Console, grouped};
+use crate::cli::files::{check, shown};
 use crate::error::Result;
 use crate::trace::Trace;
 
-/// Check a trace: schema, checksums, values and content hash
+/// Check traces: schema, checksums, values and content hash
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// The traces
@@ -18,24 +19,30 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     for path in &arguments.traces {
-        let trace = Trace::open(path)?;
-        let progress = console.progress("verifying", "fragments");
-        let mut done = 0;
-        let hash = trace.verify(|rows| {
-            done += rows;
-            progress.set(done, trace.rows());
-        })?;
-        drop(progress);
-        let seal = if trace.is_sealed() {
-            "checksums and content hash hold"
-        } else {
-            "well formed; it carries no checksums to hold it against"
-        };
-        console.print(format_args!(
-            "{}: {} fragments, content {hash}: {seal}",
-            trace.place(),
-            grouped(trace.rows())
-        ))?;
+        match verify(path, console) {
+            Ok(line) => console.print(format_args!("{line}"))?,
+            // One bad file keeps no other from being checked.
+            Err(error) => console.error(&error),
+        }
     }
     Ok(())
+}
+
+/// Checks one trace; what to say of a good one.
+fn verify(path: &Path, console: &Console) -> Result<String> {
+    check(&[path], &[])?;
+    let trace = Trace::open(path)?;
+    let progress = console.progress("verifying", "fragments");
+    let mut done = 0;
+    let hash = trace.verify(|rows| {
+        done += rows;
+        progress.set(done, trace.rows());
+    })?;
+    let seal = if trace.is_sealed() {
+        "checksums and content hash hold"
+    } else {
+        "well formed; it carries no checksums to hold it against"
+    };
+    let (place, fragments) = (shown(trace.place()), grouped(trace.rows()));
+    Ok(format!("{place}: {fragments} fragments, content {hash}: {seal}"))
 }

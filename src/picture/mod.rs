@@ -1,9 +1,11 @@
 //! Pictures: linear colours of a frame's pixels, held tile by tile.
 
-mod file;
+mod read;
 pub mod srgb;
+mod write;
 
-pub use file::{Layer, read, write_exr, write_png};
+pub use read::read;
+pub use write::{Layer, PictureFile, write_exr, write_png};
 
 use crate::tile::{TILE_PIXELS, TileGrid, TileId, TileMap};
 
@@ -108,6 +110,13 @@ impl Picture {
             }
         }
         result
+    }
+
+    /// How many of its pixels have a channel that is NaN or infinite.
+    pub fn not_finite(&self) -> u64 {
+        let finite = |x, y| self.get(x, y).iter().all(|c| c.is_finite());
+        let row = |y| (0..self.width()).filter(|x| !finite(*x, y)).count() as u64;
+        (0..self.height()).map(row).sum()
     }
 
     /// The BLAKE3 of all pixels' bits, row by row: equal for pictures that are

@@ -1,115 +1,13 @@
-//! Pictures as files: EXR (linear, layers) and PNG (sRGB, 8 bits).
+//! Reading pictures: EXR (linear, layers) and PNG (sRGB, 8 bits).
 
-use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
 
-use exr::prelude::{
-    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, ImageAttributes, LayerAttributes,
-    ReadChannels, ReadLayers, Text, Vec2, WritableImage,
-};
-use image::ImageEncoder;
+use exr::prelude::{AnyChannels, FlatSamples, ReadChannels, ReadLayers, Text};
 
 use crate::error::{Error, Result};
-use crate::output::OutputFile;
+use crate::picture::write::{check_size, exr_error};
 use crate::picture::{Picture, srgb};
 use crate::tile::TileGrid;
-
-/// The most pixels of a picture that is written or read.
-const MAX_PIXELS: u64 = 1 << 28;
-
-/// A named picture within an EXR file.
-#[derive(Clone, Copy, Debug)]
-pub struct Layer<'a> {
-    /// Its name.
-    pub name: &'a str,
-    /// What it shows.
-    pub picture: &'a Picture,
-}
-
-fn check_size(path: &Path, width: u32, height: u32) -> Result<()> {
-    if u64::from(width) * u64::from(height) <= MAX_PIXELS {
-        return Ok(());
-    }
-    Err(Error::unsupported(
-        path.display(),
-        format_args!("a picture of {width}x{height} pixels is too large"),
-        format_args!("pictures have at most {MAX_PIXELS} pixels"),
-    ))
-}
-
-/// Writes `layers`, pictures of one size, as an EXR file in single precision.
-///
-/// # Errors
-/// [`Error::Io`] where it cannot be written, [`Error::Unsupported`] where it
-/// would have more than 2^28 pixels.
-///
-/// # Panics
-/// Where there are no layers or their sizes differ.
-pub fn write_exr(path: impl AsRef<Path>, layers: &[Layer<'_>]) -> Result<()> {
-    let path = path.as_ref();
-    let (width, height) = (layers[0].picture.width(), layers[0].picture.height());
-    check_size(path, width, height)?;
-    let size = Vec2(width as usize, height as usize);
-    let layer_data: exr::prelude::Layers<_> = layers
-        .iter()
-        .map(|layer| {
-            assert_eq!(layer.picture.grid(), TileGrid::new(width, height));
-            let channel = |name: &str, index: usize| {
-                let mut samples = Vec::with_capacity(size.area());
-                for y in 0..height {
-                    samples.extend((0..width).map(|x| layer.picture.get(x, y)[index] as f32));
-                }
-                AnyChannel::new(name, FlatSamples::F32(samples))
-            };
-            let channels = [channel("R", 0), channel("G", 1), channel("B", 2)];
-            exr::prelude::Layer::new(
-                size,
-                LayerAttributes::named(layer.name),
-                Encoding::SMALL_LOSSLESS,
-                AnyChannels::sort(channels.into_iter().collect()),
-            )
-        })
-        .collect();
-    let mut attributes = ImageAttributes::new(exr::prelude::IntegerBounds::from_dimensions(size));
-    let writer = format!("screendoor {}", env!("CARGO_PKG_VERSION"));
-    attributes
-        .other
-        .insert(Text::from("writer"), exr::prelude::AttributeValue::Text(writer.as_str().into()));
-    let image = Image { attributes, layer_data };
-    // The encoder seeks, which a file under construction does not: it is encoded
-    // in memory.
-    let mut bytes = std::io::Cursor::new(Vec::new());
-    let encoded = image.write().non_parallel().to_buffered(&mut bytes);
-    encoded.map_err(|e| exr_error(path, "write", e))?;
-    bytes.seek(SeekFrom::Start(0)).map_err(|e| Error::io("write", path, e))?;
-    OutputFile::put(path, bytes.get_ref())
-}
-
-/// Writes a picture as an 8-bit sRGB PNG.
-///
-/// # Errors
-/// As [`write_exr`].
-pub fn write_png(path: impl AsRef<Path>, picture: &Picture) -> Result<()> {
-    let path = path.as_ref();
-    check_size(path, picture.width(), picture.height())?;
-    let mut bytes = Vec::with_capacity(picture.width() as usize * picture.height() as usize * 3);
-    for y in 0..picture.height() {
-        for x in 0..picture.width() {
-            bytes.extend(picture.get(x, y).map(srgb::encode8));
-        }
-    }
-    let mut file = OutputFile::create(path)?;
-    let (width, height) = (picture.width(), picture.height());
-    let encoded = image::codecs::png::PngEncoder::new(&mut file)
-        .write_image(&bytes, width, height, image::ExtendedColorType::Rgb8)
-        .map_err(|e| match e {
-            image::ImageError::IoError(e) => e,
-            other => std::io::Error::other(other),
-        })
-        .and_then(|()| file.flush());
-    encoded.map_err(|e| Error::io("write", path, e))?;
-    file.commit()
-}
 
 /// Reads the picture in an EXR file (its layer `layer`, or the first) or in a
 /// PNG (as sRGB).
@@ -141,7 +39,7 @@ fn read_png(path: &Path, bytes: &[u8]) -> Result<Picture> {
     let mut reader = image::ImageReader::new(std::io::Cursor::new(bytes));
     reader.set_format(image::ImageFormat::Png);
     let mut limits = image::Limits::no_limits();
-    limits.max_alloc = Some(MAX_PIXELS * 8);
+    limits.max_alloc = Some(crate::picture::write::MAX_PIXELS * 8);
     reader.limits(limits);
     let image = reader.decode().map_err(|e| bad(&e))?.into_rgb8();
     let (width, height) = image.dimensions();
@@ -208,20 +106,10 @@ fn read_exr(path: &Path, bytes: &[u8], layer: Option<&str>) -> Result<Picture> {
     }))
 }
 
-fn exr_error(path: &Path, action: &'static str, error: exr::error::Error) -> Error {
-    match error {
-        exr::error::Error::Io(source) => Error::io(action, path, source),
-        other => Error::invalid(
-            path.display(),
-            format_args!("it cannot be read as EXR ({other})"),
-            "give a whole EXR file",
-        ),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::picture::{Layer, write_exr, write_png};
 
     fn picture(scale: f64) -> Picture {
         Picture::from_fn(TileGrid::new(21, 18), |x, y| {

@@ -1,0 +1,186 @@
+//! Writing pictures: EXR (linear, layers) and PNG (sRGB, 8 bits).
+
+use std::path::Path;
+
+use exr::prelude::{
+    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, ImageAttributes, LayerAttributes, Text,
+    Vec2, WritableImage,
+};
+use image::ImageEncoder;
+
+use crate::error::{Error, Result};
+use crate::output::OutputFile;
+use crate::picture::{Picture, srgb};
+use crate::tile::TileGrid;
+
+/// The most pixels of a picture that is written or read.
+pub(super) const MAX_PIXELS: u64 = 1 << 28;
+
+/// A named picture within an EXR file.
+#[derive(Clone, Copy, Debug)]
+pub struct Layer<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// What it shows.
+    pub picture: &'a Picture,
+}
+
+pub(super) fn check_size(path: &Path, width: u32, height: u32) -> Result<()> {
+    if u64::from(width) * u64::from(height) <= MAX_PIXELS {
+        return Ok(());
+    }
+    Err(Error::unsupported(
+        path.display(),
+        format_args!("a picture of {width}x{height} pixels is too large"),
+        format_args!("pictures have at most {MAX_PIXELS} pixels"),
+    ))
+}
+
+enum Format {
+    Exr,
+    Png,
+}
+
+/// A picture's file under construction: begun before the work that makes the
+/// picture, so that a file that cannot be written is found out first.
+pub struct PictureFile {
+    file: OutputFile,
+    format: Format,
+}
+
+impl PictureFile {
+    /// Begins the file at `path`, whose ending says the format, for a picture of
+    /// `width` × `height` pixels.
+    ///
+    /// # Errors
+    /// [`Error::Config`] where it ends neither in .exr nor in .png,
+    /// [`Error::Unsupported`] where it would have more than 2^28 pixels, and as
+    /// [`OutputFile::create`].
+    pub fn create(path: impl AsRef<Path>, width: u32, height: u32) -> Result<Self> {
+        let path = path.as_ref();
+        let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("");
+        let format = match ending.to_ascii_lowercase().as_str() {
+            "exr" => Format::Exr,
+            "png" => Format::Png,
+            _ => {
+                return Err(Error::config(
+                    format_args!("cannot write a picture as '{}'", path.display()),
+                    "name a .exr or .png file",
+                ));
+            }
+        };
+        check_size(path, width, height)?;
+        Ok(PictureFile { file: OutputFile::create(path)?, format })
+    }
+
+    /// Writes `layers`, pictures of one size. A PNG shows the first alone.
+    ///
+    /// # Errors
+    /// [`Error::Io`] where they cannot be written.
+    ///
+    /// # Panics
+    /// Where there are no layers or their sizes differ.
+    pub fn write(&mut self, layers: &[Layer<'_>]) -> Result<()> {
+        let path = self.file.path();
+        let bytes = match self.format {
+            Format::Exr => exr_bytes(path, layers)?,
+            Format::Png => png_bytes(path, layers[0].picture)?,
+        };
+        self.file.write_bytes(&bytes)
+    }
+
+    /// Puts the file in its place.
+    ///
+    /// # Errors
+    /// As [`OutputFile::commit`].
+    pub fn commit(self) -> Result<()> {
+        self.file.commit()
+    }
+}
+
+/// Writes `layers`, pictures of one size, as an EXR file in single precision.
+///
+/// # Errors
+/// [`Error::Io`] where it cannot be written, [`Error::Unsupported`] where it
+/// would have more than 2^28 pixels.
+///
+/// # Panics
+/// Where there are no layers or their sizes differ.
+pub fn write_exr(path: impl AsRef<Path>, layers: &[Layer<'_>]) -> Result<()> {
+    OutputFile::put(&path, &exr_bytes(path.as_ref(), layers)?)
+}
+
+/// Writes a picture as an 8-bit sRGB PNG.
+///
+/// # Errors
+/// As [`write_exr`].
+pub fn write_png(path: impl AsRef<Path>, picture: &Picture) -> Result<()> {
+    OutputFile::put(&path, &png_bytes(path.as_ref(), picture)?)
+}
+
+/// The bytes of an EXR file; `path` names it in errors.
+fn exr_bytes(path: &Path, layers: &[Layer<'_>]) -> Result<Vec<u8>> {
+    let (width, height) = (layers[0].picture.width(), layers[0].picture.height());
+    check_size(path, width, height)?;
+    let size = Vec2(width as usize, height as usize);
+    let layer_data: exr::prelude::Layers<_> = layers
+        .iter()
+        .map(|layer| {
+            assert_eq!(layer.picture.grid(), TileGrid::new(width, height));
+            let channel = |name: &str, index: usize| {
+                let mut samples = Vec::with_capacity(size.area());
+                for y in 0..height {
+                    samples.extend((0..width).map(|x| layer.picture.get(x, y)[index] as f32));
+                }
+                AnyChannel::new(name, FlatSamples::F32(samples))
+            };
+            let channels = [channel("R", 0), channel("G", 1), channel("B", 2)];
+            exr::prelude::Layer::new(
+                size,
+                LayerAttributes::named(layer.name),
+                Encoding::SMALL_LOSSLESS,
+                AnyChannels::sort(channels.into_iter().collect()),
+            )
+        })
+        .collect();
+    let mut attributes = ImageAttributes::new(exr::prelude::IntegerBounds::from_dimensions(size));
+    let writer = format!("screendoor {}", env!("CARGO_PKG_VERSION"));
+    attributes
+        .other
+        .insert(Text::from("writer"), exr::prelude::AttributeValue::Text(writer.as_str().into()));
+    let image = Image { attributes, layer_data };
+    // The encoder seeks, which a file under construction does not: it is encoded
+    // in memory.
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let encoded = image.write().non_parallel().to_buffered(&mut bytes);
+    encoded.map_err(|e| exr_error(path, "write", e))?;
+    Ok(bytes.into_inner())
+}
+
+/// The bytes of a PNG file; `path` names it in errors.
+fn png_bytes(path: &Path, picture: &Picture) -> Result<Vec<u8>> {
+    let (width, height) = (picture.width(), picture.height());
+    check_size(path, width, height)?;
+    let mut pixels = Vec::with_capacity(width as usize * height as usize * 3);
+    for y in 0..height {
+        for x in 0..width {
+            pixels.extend(picture.get(x, y).map(srgb::encode8));
+        }
+    }
+    let mut bytes = Vec::new();
+    image::codecs::png::PngEncoder::new(&mut bytes)
+        .write_image(&pixels, width, height, image::ExtendedColorType::Rgb8)
+        .map_err(|e| Error::io("write", path, std::io::Error::other(e)))?;
+    Ok(bytes)
+}
+
+pub(super) fn exr_error(path: &Path, action: &'static str, error: exr::error::Error) -> Error {
+    match error {
+        exr::error::Error::Io(source) => Error::io(action, path, source),
+        other => Error::invalid(
+            path.display(),
+            format_args!("it cannot be read as EXR ({other})"),
+            "give a whole EXR file",
+        ),
+    }
+}

@@ -1,0 +1,201 @@
+//! Outputs: never an input, found out before the work, whole or not at all.
+
+use super::*;
+
+#[test]
+fn an_output_is_never_an_input_nor_another_output() {
+    let place = Workplace::with_trace();
+    place.good(&["replay", "t.arrow", "-o", "a.exr"]);
+    let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    fs::write(place.path("tri.obj"), triangle).unwrap();
+    fs::create_dir(place.path("sub")).unwrap();
+    let mut cases: Vec<&[&str]> = vec![
+        &["capture", "tri.obj", "-o", "tri.obj"],
+        &["capture", "builtin:ramps", "--texture", "a.exr", "-o", "sub/../a.exr"],
+        &["info", "t.arrow", "--json", "t.arrow"],
+        &["explain", "t.arrow", "--pixel", "1,1", "--json", "./t.arrow"],
+        &["replay", "t.arrow", "--json", "t.arrow"],
+        &["compare", "a.exr", "a.exr", "-o", "a.exr"],
+        &["compare", "a.exr", "a.exr", "--json", "a.exr"],
+        &["replay", "t.arrow", "-o", "x.exr", "--json", "x.exr"],
+        &["replay", "t.arrow", "-o", "x.exr", "-o", "sub/../x.exr"],
+        &["demo", "--output", "sub", "--json", "sub/trace.arrow"],
+    ];
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink("t.arrow", place.path("link.arrow")).unwrap();
+        fs::hard_link(place.path("t.arrow"), place.path("hard.arrow")).unwrap();
+        cases.push(&["replay", "t.arrow", "--json", "link.arrow"]);
+        cases.push(&["replay", "link.arrow", "--json", "t.arrow"]);
+        cases.push(&["info", "t.arrow", "--json", "hard.arrow"]);
+    }
+    let inputs = ["t.arrow", "a.exr", "tri.obj"];
+    let read = |name| fs::read(place.path(name)).unwrap();
+    let before = inputs.map(read);
+    for arguments in cases {
+        let (code, error) = place.bad(arguments);
+        assert_eq!(code, 2, "{arguments:?}: {error}");
+        assert!(error.contains("overwrite") || error.contains("one file"), "{error}");
+        assert_eq!(before, inputs.map(read), "{arguments:?}");
+    }
+    assert!(!place.path("x.exr").exists());
+}
+
+/// Spoils the fragments of a trace, so that every work on it fails.
+fn spoil(place: &Workplace, name: &str) {
+    let mut bytes = fs::read(place.path("t.arrow")).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    fs::write(place.path(name), bytes).unwrap();
+}
+
+#[test]
+fn what_cannot_be_written_is_found_out_before_the_work() {
+    let place = Workplace::with_trace();
+    place.good(&["replay", "t.arrow", "-o", "a.exr"]);
+    spoil(&place, "bad.arrow");
+    fs::write(place.path("file"), "").unwrap();
+    let before = files(place.0.path());
+    let cases: &[&[&str]] = &[
+        &["replay", "bad.arrow", "-o", "gone/x.exr"],
+        &["replay", "bad.arrow", "-o", "x.exr", "-o", "gone/x.exr"],
+        &["replay", "t.arrow", "-o", "x.exr", "--json", "gone/x.json"],
+        &["info", "bad.arrow", "--json", "gone/x.json"],
+        &["explain", "bad.arrow", "--pixel", "1,1", "--json", "gone/x.json"],
+        &["compare", "a.exr", "a.exr", "-o", "x.exr", "--json", "gone/x.json"],
+        &["capture", "missing.obj", "-o", "gone/x.arrow"],
+        &["scenes", "--json", "gone/x.json"],
+    ];
+    for arguments in cases {
+        let (code, error) = place.bad(arguments);
+        assert_eq!(code, 1, "{arguments:?}: {error}");
+        assert!(error.contains("the folder gone does not exist"), "{error}");
+        assert!(!error.contains(".partial"), "{error}");
+        assert_eq!(files(place.0.path()), before, "{arguments:?}");
+    }
+    let (_, error) = place.bad(&["replay", "t.arrow", "-o", "file/x.exr"]);
+    assert!(error.contains(": file is no folder"), "{error}");
+    let (code, error) = place.bad(&["demo", "--scene", "builtin:ramps", "--json", "gone/x.json"]);
+    assert!(code == 1 && !place.path("screendoor-demo/trace.arrow").exists(), "{error}");
+    let (code, error) = place.bad(&["reproduce", "-o", "file"]);
+    assert!(code == 1, "{error}");
+    fs::create_dir(place.path("RESULTS.md")).unwrap();
+    let (code, error) = place.bad(&["reproduce", "-o", "."]);
+    assert!(code == 1 && error.contains("RESULTS.md: it is a folder"), "{error}");
+}
+
+#[test]
+#[cfg(unix)]
+fn figures_are_printed_even_where_files_cannot_be_written() {
+    let place = Workplace::with_trace();
+    let before = files(place.0.path());
+    let limited = "trap '' XFSZ; ulimit -f 1; exec \"$PROGRAM\"";
+    for command in ["replay t.arrow -o p.exr -o q.png", "info t.arrow --json i.json"] {
+        let (code, error) = shell(&place, &format!("{limited} {command} | cat >&2"));
+        assert_eq!(code, Some(0), "that of cat");
+        assert!(error.contains("fragments") && error.contains("cannot write"), "{error}");
+        assert!(!error.contains(".partial"), "{error}");
+        assert_eq!(files(place.0.path()), before);
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn a_write_protected_file_stays_and_permissions_are_kept() {
+    use std::os::unix::fs::PermissionsExt;
+    let place = Workplace::with_trace();
+    place.good(&["replay", "t.arrow", "-o", "p.png"]);
+    let mode = |m| fs::set_permissions(place.path("p.png"), fs::Permissions::from_mode(m)).unwrap();
+    mode(0o444);
+    let before = fs::read(place.path("p.png")).unwrap();
+    let (code, error) = place.bad(&["replay", "t.arrow", "--samples", "1", "-o", "p.png"]);
+    assert!(code == 1 && error.contains("it is write-protected"), "{error}");
+    assert_eq!(fs::read(place.path("p.png")).unwrap(), before);
+    mode(0o600);
+    place.good(&["replay", "t.arrow", "--samples", "1", "-o", "p.png"]);
+    assert_ne!(fs::read(place.path("p.png")).unwrap(), before);
+    let now = fs::metadata(place.path("p.png")).unwrap().permissions().mode();
+    assert_eq!(now & 0o777, 0o600);
+}
+
+/// Starts a capture of gigabytes; ends it with `signal` once its file is there.
+#[cfg(unix)]
+fn interrupt(place: &Workplace, before: &str, signal: &str) -> std::process::ExitStatus {
+    let command = format!(
+        "{before} exec \"$PROGRAM\" capture builtin:layers:count=100000 -o big.arrow --size 600x600"
+    );
+    let mut child = Command::new("sh")
+        .args(["-c", &command])
+        .env("PROGRAM", PROGRAM)
+        .current_dir(place.0.path())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let begun = || files(place.0.path()).iter().any(|name| name.ends_with(".partial"));
+    for _ in 0..600 {
+        if begun() {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(50));
+    }
+    let there = begun();
+    let sent = Command::new("kill").args([signal, &child.id().to_string()]).status();
+    if signal == "-HUP" && !before.is_empty() {
+        std::thread::sleep(std::time::Duration::from_millis(200));
+        assert!(child.try_wait().unwrap().is_none(), "nohup's wish was not heeded");
+        Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap();
+    }
+    let status = child.wait().unwrap();
+    assert!(sent.unwrap().success() && there, "the capture never began its file");
+    status
+}
+
+#[test]
+#[cfg(unix)]
+fn a_program_told_to_end_leaves_nothing_half_done() {
+    use std::os::unix::process::ExitStatusExt;
+    let place = Workplace::new();
+    fs::write(place.path("big.arrow"), "old").unwrap();
+    for (before, signal, number) in
+        [("", "-TERM", 15), ("", "-INT", 2), ("", "-HUP", 1), ("trap '' HUP;", "-HUP", 15)]
+    {
+        let status = interrupt(&place, before, signal);
+        // A shell reports this as 128 and the number: 143, 130, 129.
+        assert_eq!(status.signal(), Some(number), "{signal}");
+        assert_eq!(files(place.0.path()), ["big.arrow"], "{signal}");
+        assert_eq!(fs::read(place.path("big.arrow")).unwrap(), b"old");
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn a_full_disk_leaves_the_good_file_and_nothing_else() {
+    let place = Workplace::with_trace();
+    place.good(&["replay", "t.arrow", "-o", "p.exr", "-o", "p.png"]);
+    let before: Vec<_> =
+        ["t.arrow", "p.exr", "p.png"].iter().map(|f| fs::read(place.path(f)).unwrap()).collect();
+    // No file may grow beyond one block of 512 bytes: writes fail as on a full disk.
+    let limited = "trap '' XFSZ; ulimit -f 1; exec \"$PROGRAM\"";
+    for command in [
+        "capture builtin:ramps -o t.arrow --size 200x200",
+        "replay t.arrow -o p.exr",
+        "replay t.arrow --samples 4 -o p.png",
+    ] {
+        let (code, error) = shell(&place, &format!("{limited} {command}"));
+        assert_eq!(code, Some(1), "{command}: {error}");
+        assert!(error.contains("cannot write"), "{error}");
+        assert_eq!(error.trim_end().lines().count(), 1, "{error}");
+    }
+    assert_eq!(files(place.0.path()), ["p.exr", "p.png", "t.arrow"]);
+    for (name, bytes) in ["t.arrow", "p.exr", "p.png"].iter().zip(before) {
+        assert_eq!(fs::read(place.path(name)).unwrap(), bytes);
+    }
+    // A device that is always full, and one that takes everything.
+    if Path::new("/dev/full").exists() {
+        let (code, error) = shell(&place, "exec \"$PROGRAM\" capture builtin:ramps -o /dev/full");
+        assert_eq!(code, Some(1), "{error}");
+        assert!(error.contains("cannot write /dev/full"), "{error}");
+    }
+    assert_eq!(shell(&place, "exec \"$PROGRAM\" capture builtin:ramps -o /dev/null").0, Some(0));
+    assert!(!fs::metadata("/dev/null").unwrap().is_file());
+}
