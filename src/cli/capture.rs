@@ -7,8 +7,8 @@ use clap::Args;
 
 use crate::capture::{CameraOptions, Capture, CaptureOptions, Faces, Order, PatternKind};
 use crate::cli::arguments::{self, colour, numbers, option, samples, size};
-use crate::cli::console::{Console, grouped};
-use crate::cli::files::{check, shown};
+use crate::cli::console::{Console, grouped, shown};
+use crate::cli::files::check;
 use crate::error::{Error, Result};
 use crate::output::OutputFile;
 use crate::scene;

@@ -1,13 +1,12 @@
 //! What the user sees: output, progress, warnings, tables.
 
 use std::cell::Cell;
-use std::fmt::Arguments;
+use std::fmt::{Arguments, Display};
 use std::io::{self, Write};
 
 use comfy_table::{CellAlignment, Table, presets};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::cli::files::shown;
 use crate::error::{Error, Result};
 
 /// The user's terminal.
@@ -130,6 +129,16 @@ pub(super) fn grouped(n: u64) -> String {
     out
 }
 
+/// `text` with control characters shown, not obeyed: names of files and what a
+/// trace says of itself come from others.
+pub(super) fn shown(text: impl Display) -> String {
+    let mut out = String::new();
+    for c in text.to_string().chars() {
+        if c.is_control() { out.extend(c.escape_debug()) } else { out.push(c) }
+    }
+    out
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -139,5 +148,10 @@ mod tests {
         assert_eq!(grouped(0), "0");
         assert_eq!(grouped(999), "999");
         assert_eq!(grouped(1_234_567), "1 234 567");
+    }
+
+    #[test]
+    fn control_characters_are_shown() {
+        assert_eq!(shown("a\u{1b}[31m\nb\u{9b}é…"), "a\\u{1b}[31m\\nb\\u{9b}é…");
     }
 }

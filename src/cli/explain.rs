@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use crate::cli::arguments::{RunArguments, numbers};
-use crate::cli::console::Console;
-use crate::cli::files::{Json, check, report, shown};
+use crate::cli::console::{Console, shown};
+use crate::cli::files::{Json, check, report};
 use crate::error::{Error, Result};
 use crate::param::Values;
 use crate::rop::{Contents, Explanation, Site, Step};

@@ -1,7 +1,6 @@
 //! The files of a command: inputs that stay as they are, and outputs that are
 //! begun before the work.
 
-use std::fmt::Display;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -105,25 +104,5 @@ pub(super) fn report(
             }
             written
         }
-    }
-}
-
-/// `text` with control characters shown, not obeyed: names of files and what a
-/// trace says of itself come from others.
-pub(super) fn shown(text: impl Display) -> String {
-    let mut out = String::new();
-    for c in text.to_string().chars() {
-        if c.is_control() { out.extend(c.escape_debug()) } else { out.push(c) }
-    }
-    out
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn control_characters_are_shown() {
-        assert_eq!(shown("a\u{1b}[31m\nb\u{9b}é…"), "a\\u{1b}[31m\\nb\\u{9b}é…");
     }
 }

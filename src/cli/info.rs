@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use crate::cli::console::{Console, grouped};
-use crate::cli::files::{Json, check, open_trace, report, shown};
+use crate::cli::console::{Console, grouped, shown};
+use crate::cli::files::{Json, check, open_trace, report};
 use crate::error::Result;
 use crate::trace::{Header, Statistics, Trace, statistics};
 

@@ -7,8 +7,8 @@ use clap::Args;
 use serde::Serialize;
 
 use crate::cli::arguments::RunArguments;
-use crate::cli::console::{Console, grouped};
-use crate::cli::files::{Json, check, report, shown};
+use crate::cli::console::{Console, grouped, shown};
+use crate::cli::files::{Json, check, report};
 use crate::design::{Configured, REFERENCE, configure};
 use crate::error::Result;
 use crate::metrics::{Ensemble, EnsembleErrors, PixelClasses, Region};

@@ -5,8 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::cli::console::Console;
-use crate::cli::files::shown;
+use crate::cli::console::{Console, shown};
 use crate::error::{Error, Result};
 use crate::output::OutputFile;
 use crate::picture::write_png;

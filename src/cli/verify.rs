@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use crate::cli::console::{Console, grouped};
-use crate::cli::files::{check, shown};
+use crate::cli::console::{Console, grouped, shown};
+use crate::cli::files::check;
 use crate::error::Result;
 use crate::trace::Trace;
 
