@@ -289,8 +289,8 @@ fn scenes() -> Vec<Hostile> {
         ),
         text(
             "corners.obj",
-            &format!("{triangle}f 1 2 3\nf # 1 2 3\n"),
-            "line 5 ('f # 1 2 3'): the face has no corners",
+            &format!("{triangle}f 1 2 3\nf\n"),
+            "line 5 ('f'): the face has no corners",
             "a face without corners",
         ),
         text("two.obj", "v 0 0\nf 1 1 1\n", "line 1 ('v 0 0'): a vertex has", "half a vertex"),
@@ -299,6 +299,12 @@ fn scenes() -> Vec<Hostile> {
             &format!("{triangle}vn 0 0 1\nf 1//1 2//1 3//2\n"),
             "line 5 ('f 1//1 2//1 3//2'): normal 2 is not there",
             "a corner that names a normal that is not there",
+        ),
+        text(
+            "large-index.obj",
+            &format!("{triangle}vn 0 0 1\nf 1//9223372036854775807 2//1 3//1\n"),
+            "normal 9223372036854775807 is not there",
+            "a number that overflows when it is multiplied",
         ),
         text("points.obj", triangle, "no triangles", "vertices and no faces"),
         text("empty.obj", "", "no triangles", "no bytes at all"),

@@ -7,6 +7,7 @@ use gltf::json::validation::{Checked, Error as Invalid};
 use gltf::{Document, Semantic, json};
 
 use crate::error::{Error, Result};
+use crate::scene::one_line;
 
 /// The bytes before the first chunk of a GLB file.
 const GLB_HEADER: usize = 12;
@@ -35,7 +36,7 @@ struct Asset {
 pub(super) fn read<'a>(path: &Path, bytes: &'a [u8]) -> Result<(Document, Option<Cow<'a, [u8]>>)> {
     let place = path.display();
     let bad = |what: &dyn std::fmt::Display| {
-        let what = format!("it cannot be read as glTF: {what}");
+        let what = one_line(&format!("it cannot be read as glTF: {what}"));
         Error::invalid(&place, what, "export the file again")
     };
     let (text, blob) = if bytes.starts_with(b"glTF") {
@@ -81,8 +82,8 @@ fn check_version(path: &Path, asset: &Asset) -> Result<()> {
     }
     let wanted = asset.min_version.as_ref().filter(|_| version).unwrap_or(&asset.version);
     // The version is text of any kind, and any length.
-    let wanted: String = wanted.chars().filter(|c| !c.is_control()).take(20).collect();
-    let what = format!("it wants glTF {wanted}");
+    let wanted: String = wanted.chars().take(20).collect();
+    let what = format!("it wants glTF {}", one_line(&wanted));
     Err(Error::unsupported(path.display(), what, "export it as glTF 2.0"))
 }
 
@@ -91,7 +92,7 @@ fn explain(path: &Path, found: &[(json::Path, Invalid)]) -> Error {
     let Some((part, error)) = found.first() else {
         return Error::invalid(path.display(), "it is no valid glTF", "export the file again");
     };
-    let place = format!("{}, {part}", path.display());
+    let place = format!("{}, {}", path.display(), one_line(part.as_str()));
     let what = match error {
         Invalid::IndexOutOfBounds => "it names what is not there",
         Invalid::Invalid => "its value is not one that glTF allows",

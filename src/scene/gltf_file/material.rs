@@ -6,7 +6,7 @@ use glam::{Affine2, Vec2, Vec3, Vec4};
 
 use super::Loader;
 use crate::error::Result;
-use crate::scene::{AlphaMode, Material, Texture, TextureUse, Wrap};
+use crate::scene::{AlphaMode, Material, Texture, TextureUse, Wrap, one_line};
 
 impl Loader<'_> {
     pub(super) fn material(&mut self, material: &gltf::Material<'_>) -> Result<usize> {
@@ -25,7 +25,7 @@ impl Loader<'_> {
         if let [Some(base), Some(emissive)] = texture_sets(material)
             && base != emissive
         {
-            let name = material.name().unwrap_or("");
+            let name = one_line(material.name().unwrap_or(""));
             self.scene.warnings.push(format!(
                 "{}, material '{name}': its emissive texture wants texture coordinates \
                  {emissive}, and is drawn with its base texture's, {base}",
@@ -40,7 +40,7 @@ impl Loader<'_> {
             Vec3::from(material.emissive_factor())
         };
         let made = Material {
-            name: material.name().unwrap_or("").to_string(),
+            name: one_line(material.name().unwrap_or("")),
             base: Vec4::from(pbr.base_color_factor()),
             base_texture,
             alpha_texture: None,

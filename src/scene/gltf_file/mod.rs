@@ -12,7 +12,7 @@ use base64::Engine as _;
 use glam::{DAffine3, DMat4};
 
 use crate::error::{Error, Result};
-use crate::scene::{Object, Scene, Wrap, file, file_name};
+use crate::scene::{Object, Scene, Wrap, file, file_name, one_line};
 
 /// The deepest nesting of nodes.
 const MAX_DEPTH: usize = 256;
@@ -87,7 +87,7 @@ impl<'a> Loader<'a> {
         if !inside || decoded.contains(':') {
             return Err(self.bad(
                 part,
-                format_args!("'{uri}' leads out of the scene's folder"),
+                format_args!("'{}' leads out of the scene's folder", one_line(uri)),
                 "put the file beside the scene and name it without '..'",
             ));
         }
@@ -141,7 +141,7 @@ impl<'a> Loader<'a> {
                 }
             };
             let name = node.name().or(mesh.name());
-            let name = name.map_or(part, str::to_string);
+            let name = name.map_or(part, one_line);
             for shape in shapes {
                 let place = DAffine3::from_mat4(place);
                 self.scene.objects.push(Object { name: name.clone(), shape, place });

@@ -8,10 +8,10 @@
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
-use super::lines::{Lines, Statement};
+use super::lines::{Lines, Statement, shown};
 use super::mtl::Library;
 use crate::error::{Error, Result};
-use crate::scene::Scene;
+use crate::scene::{Scene, one_line};
 
 /// A run of faces of one name and one material; each becomes an object that
 /// `tobj` knows by its number.
@@ -88,7 +88,7 @@ impl<'a> Cleaner<'a> {
             "o" | "g" => {
                 let name = statement.name();
                 let name = if name.is_empty() { "unnamed_object" } else { name };
-                self.begin(Segment { name: name.to_string(), ..self.current() });
+                self.begin(Segment { name: one_line(name), ..self.current() });
                 Ok(())
             }
             "usemtl" => {
@@ -143,7 +143,7 @@ impl<'a> Cleaner<'a> {
             (1, [u]) => self.write(format_args!("vt {u} 0\n")),
             (1, [u, v]) => self.write(format_args!("vt {u} {v}\n")),
             (_, [x, y, z]) => self.write(format_args!("vn {x} {y} {z}\n")),
-            _ => return Err(format!("a {} has more numbers", KINDS[kind])),
+            _ => return Err(format!("these are too few numbers for a {}", KINDS[kind])),
         }
         self.counts[kind] += 1;
         Ok(())
@@ -162,8 +162,8 @@ impl<'a> Cleaner<'a> {
         for corner in corners {
             let mut parts = corner.split('/');
             let mut index = [None; 3];
-            for kind in 0..3 {
-                index[kind] = match parts.next() {
+            for (kind, index) in index.iter_mut().enumerate() {
+                *index = match parts.next() {
                     // Some exporters name attributes that the file does not have.
                     Some(part) if !part.is_empty() && (kind == 0 || self.counts[kind] > 0) => {
                         Some(self.index(part, kind, statement)?)
@@ -172,7 +172,7 @@ impl<'a> Cleaner<'a> {
                 };
             }
             let (Some(v), None) = (index[0], parts.next()) else {
-                return Err(format!("'{corner}' is no corner of a face"));
+                return Err(format!("'{}' is no corner of a face", shown(corner)));
             };
             // The first of each is the one that stands for none.
             let [vt, vn] = [index[1], index[2]].map(|i| i.map_or(1, |i| i + 1));
@@ -186,14 +186,16 @@ impl<'a> Cleaner<'a> {
     fn index(&mut self, part: &str, kind: usize, statement: &Statement) -> Result<i64, String> {
         let count = self.counts[kind];
         let what = KINDS[kind];
-        let index: i64 = part.parse().map_err(|_| format!("'{part}' is no number of a {what}"))?;
+        let index: i64 =
+            part.parse().map_err(|_| format!("'{}' is no number of a {what}", shown(part)))?;
         let absolute = if index < 0 { count.saturating_add(index) + 1 } else { index };
-        if absolute < 1 {
-            return Err(format!("{what} {index} is not there: {count} stand before the line"));
+        // Numbers this large would overflow in tobj.
+        if absolute < 1 || absolute > i64::from(u32::MAX) {
+            return Err(format!("{what} {index} is not there, of {count} up to this line"));
         }
         if absolute > count && self.beyond.is_none() {
             // What follows may still bring it; else this is the error.
-            let what = format!("{what} {index} is not there: {count} stand before the line");
+            let what = format!("{what} {index} is not there, of {count} up to this line");
             let place = statement.place(&self.path);
             self.beyond = Some(Error::invalid(place, what, "correct the line"));
         }
@@ -204,7 +206,7 @@ impl<'a> Cleaner<'a> {
         let material = self.library.find(statement.name());
         if material.is_none() {
             let line = statement.line;
-            let first = || (statement.name().to_string(), line, 0);
+            let first = || (shown(statement.name()), line, 0);
             self.undefined.get_or_insert_with(first).2 += 1;
         }
         if self.current().material != material {

@@ -5,7 +5,7 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
-use crate::scene::file;
+use crate::scene::{file, one_line};
 
 /// The longest statement, in bytes.
 const MAX_BYTES: u64 = 1 << 24;
@@ -53,9 +53,9 @@ impl Statement {
     }
 }
 
-/// The beginning of a text, fit for one line.
-fn shown(text: &str) -> String {
-    text.chars().take(SHOWN).map(|c| if c.is_control() { ' ' } else { c }).collect()
+/// The beginning of a text, as messages show it.
+pub(super) fn shown(text: &str) -> String {
+    one_line(&text.chars().take(SHOWN).collect::<String>())
 }
 
 /// Reads a file statement by statement.

@@ -12,7 +12,7 @@ use glam::{Vec3, Vec4};
 use super::lines::{Lines, Statement};
 use crate::error::Result;
 use crate::scene::texture::Encoding;
-use crate::scene::{AlphaMode, Material, Scene, Texture, TextureUse};
+use crate::scene::{AlphaMode, Material, Scene, Texture, TextureUse, one_line};
 
 /// The materials that an OBJ file's MTL files define.
 ///
@@ -62,8 +62,13 @@ impl Library {
     pub fn read(&mut self, names: &str, scene: &mut Scene) {
         let names = names.replace('\\', "/");
         let words: Vec<&str> = names.split_whitespace().collect();
+        if words.is_empty() {
+            scene.warnings.push(format!("{}: a mtllib statement names no file", scene.source));
+        }
         let there = |name: &&str| self.folder.join(name).exists();
-        let names = if there(&names.as_str()) || !words.iter().any(there) {
+        let names = if words.is_empty() {
+            words
+        } else if there(&names.as_str()) || !words.iter().any(there) {
             vec![names.as_str()]
         } else {
             words
@@ -123,7 +128,7 @@ impl Library {
         self.numbers.insert(definition.name.clone(), scene.materials.len());
         let base: Vec4 = definition.diffuse.unwrap_or(Vec3::ONE).extend(alpha);
         scene.materials.push(Material {
-            name: definition.name,
+            name: one_line(&definition.name),
             base,
             base_texture,
             alpha_texture,
@@ -198,7 +203,7 @@ fn colour(statement: &Statement) -> Result<Vec3, String> {
     }
     match *numbers {
         [grey] => Ok(Vec3::splat(grey)),
-        [r, g, b] => Ok(Vec3::new(r, g, b)),
+        [r, g, b, ..] => Ok(Vec3::new(r, g, b)),
         _ => Err("a colour has three numbers, or one".to_string()),
     }
 }
