@@ -5,6 +5,7 @@
 //! (OBJ, glTF, GLB) or `builtin:NAME`.
 
 pub mod builtin;
+mod file;
 mod gltf_file;
 mod material;
 mod obj_file;
@@ -18,6 +19,10 @@ pub use material::{AlphaMode, Material, TextureUse};
 pub use texture::{Texture, Wrap};
 
 use crate::error::{Error, Result};
+
+/// The most texels of all textures of a scene that were read from files: 11 bytes
+/// each when loaded.
+const MAX_TEXELS: u64 = 1 << 28;
 
 /// A scene: objects that draw shapes with materials.
 #[derive(Clone, Debug, Default)]
@@ -217,17 +222,33 @@ impl Scene {
         self.shapes.push(shape);
     }
 
+    /// Adds a texture that was read; its number.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] where the scene's textures then had more than
+    /// [`MAX_TEXELS`] texels together.
+    fn add_texture(&mut self, texture: Texture) -> Result<usize> {
+        let size = |t: &Texture| u64::from(t.width()) * u64::from(t.height());
+        if self.textures.iter().map(size).sum::<u64>() + size(&texture) > MAX_TEXELS {
+            let what = format!("its textures have more than {MAX_TEXELS} texels together");
+            return Err(Error::unsupported(&self.source, what, "scale them down"));
+        }
+        self.textures.push(texture);
+        Ok(self.textures.len() - 1)
+    }
+
     /// Puts the texture in the file at `path` on every material that has none;
     /// where it has an alpha, those materials show it.
     ///
     /// # Errors
-    /// As [`Texture::read`].
+    /// As [`Texture::read`], and where the scene's textures become too large
+    /// together.
     pub fn apply_texture(&mut self, path: &Path) -> Result<()> {
         let texture = Texture::read(path)?;
         let has_alpha = texture.has_alpha();
-        self.textures.push(texture);
+        let texture = self.add_texture(texture)?;
         for material in self.materials.iter_mut().filter(|m| m.base_texture.is_none()) {
-            material.base_texture = Some(TextureUse::plain(self.textures.len() - 1));
+            material.base_texture = Some(TextureUse::plain(texture));
             if has_alpha && material.alpha_mode == AlphaMode::Opaque {
                 material.alpha_mode = AlphaMode::Blend;
             }
@@ -387,6 +408,11 @@ pub fn load(source: &str) -> Result<Scene> {
     }
     scene.check()?;
     Ok(scene)
+}
+
+/// A text of a file fit for one line of a message or a name.
+fn one_line(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }
 
 /// The name under which a file appears in traces: without its folders, so that a

@@ -232,7 +232,7 @@ fn traces() -> Vec<Hostile> {
 }
 
 /// A glTF file with one triangle, changed by `edit`.
-fn gltf(edit: impl Fn(&mut serde_json::Value)) -> Vec<u8> {
+pub fn gltf(edit: impl Fn(&mut serde_json::Value)) -> Vec<u8> {
     let positions: [f32; 9] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
     let bytes: Vec<u8> = positions.iter().flat_map(|v| v.to_le_bytes()).collect();
     let data = base64::Engine::encode(&base64::engine::general_purpose::STANDARD, bytes);
@@ -266,7 +266,7 @@ fn scenes() -> Vec<Hostile> {
         text(
             "nan.obj",
             "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n",
-            "no finite place",
+            "line 2 ('v nan 0 0'): 'nan' is no finite number",
             "a vertex that is no number",
         ),
         text(
@@ -286,6 +286,25 @@ fn scenes() -> Vec<Hostile> {
             "v 0 0 zero\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
             "line 1",
             "a coordinate that is no number",
+        ),
+        text(
+            "corners.obj",
+            &format!("{triangle}f 1 2 3\nf\n"),
+            "line 5 ('f'): the face has no corners",
+            "a face without corners",
+        ),
+        text("two.obj", "v 0 0\nf 1 1 1\n", "line 1 ('v 0 0'): a vertex has", "half a vertex"),
+        text(
+            "normal.obj",
+            &format!("{triangle}vn 0 0 1\nf 1//1 2//1 3//2\n"),
+            "line 5 ('f 1//1 2//1 3//2'): normal 2 is not there",
+            "a corner that names a normal that is not there",
+        ),
+        text(
+            "large-index.obj",
+            &format!("{triangle}vn 0 0 1\nf 1//9223372036854775807 2//1 3//1\n"),
+            "normal 9223372036854775807 is not there",
+            "a number that overflows when it is multiplied",
         ),
         text("points.obj", triangle, "no triangles", "vertices and no faces"),
         text("empty.obj", "", "no triangles", "no bytes at all"),
@@ -342,9 +361,39 @@ fn scenes() -> Vec<Hostile> {
                 j["accessors"][0]["componentType"] = 5121.into();
             },
         ),
-        edited("circle.gltf", "in a circle", "a node that is its own child", |j| {
+        edited("circle.gltf", "its own ancestor", "a node that is its own child", |j| {
             j["nodes"][0]["children"] = serde_json::json!([0]);
         }),
+        edited("doubling.gltf", "it has two parents", "2^40 ways to one node", |j| {
+            let node = |i: usize| match i {
+                40 => serde_json::json!({ "mesh": 0 }),
+                _ => serde_json::json!({ "children": [i + 1, i + 1] }),
+            };
+            j["nodes"] = (0..41).map(node).collect();
+        }),
+        edited("listed-twice.gltf", "is listed twice", "a node listed twice", |j| {
+            j["scenes"][0]["nodes"] = serde_json::json!([0, 0]);
+        }),
+        edited(
+            "no-accessor.gltf",
+            "an accessor that is not there",
+            "positions without accessors",
+            |j| {
+                j.as_object_mut().unwrap().remove("accessors");
+            },
+        ),
+        edited("version.gltf", "it wants glTF 9.0", "a version to come", |j| {
+            j["asset"]["version"] = "9.0".into();
+        }),
+        edited("min-version.gltf", "it wants glTF 3.0", "a file for newer readers", |j| {
+            j["asset"]["minVersion"] = "3.0".into();
+        }),
+        Hostile {
+            name: "short-header.glb",
+            bytes: b"glTF\x02\0\0\0\x03\0\0\0".to_vec(),
+            says: "the header of the GLB is cut off",
+            what: "a header that claims 3 bytes",
+        },
         edited("index.gltf", "names vertices", "indices beyond the vertices", |j| {
             // The positions' own bytes, read as indices.
             j["accessors"] = serde_json::json!([j["accessors"][0], {
@@ -360,7 +409,7 @@ fn scenes() -> Vec<Hostile> {
         }),
         edited(
             "extension.gltf",
-            "cannot be read as glTF",
+            "the extension is not supported",
             "a required extension that is not known",
             |j| {
                 j["extensionsRequired"] = serde_json::json!(["KHR_draco_mesh_compression"]);

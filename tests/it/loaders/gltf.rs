@@ -1,0 +1,98 @@
+//! glTF.
+
+use glam::{Vec2, Vec3};
+use screendoor::error::Error;
+use screendoor::scene::Scene;
+use serde_json::{Value, json};
+
+use super::{folder, load_in, png, warned};
+use crate::hostile;
+
+/// A glTF scene of one textured triangle, changed by `edit`.
+fn gltf(edit: impl Fn(&mut Value)) -> Result<Scene, Error> {
+    let image = png(image::RgbImage::from_pixel(2, 2, image::Rgb([255; 3])));
+    let files: [(&str, &[u8]); 2] = [
+        (
+            "a.gltf",
+            &hostile::gltf(|j| {
+                textured(j);
+                edit(j)
+            }),
+        ),
+        ("a.png", &image),
+    ];
+    load_in(folder(&files).path(), "a.gltf")
+}
+
+/// Gives the triangle a material with a texture in `a.png`.
+pub fn textured(json: &mut Value) {
+    json["images"] = json!([{ "uri": "a.png" }]);
+    json["textures"] = json!([{ "source": 0 }]);
+    json["materials"] = json!([{ "emissiveFactor": [1, 1, 1], "emissiveTexture": { "index": 0 } }]);
+    json["meshes"][0]["primitives"][0]["material"] = 0.into();
+}
+
+#[test]
+fn application_specific_attributes_are_ignored() {
+    let scene = gltf(|j| {
+        let attributes = &mut j["meshes"][0]["primitives"][0]["attributes"];
+        attributes["_FOO"] = 0.into();
+        attributes["_BATCH_ID"] = 0.into();
+    });
+    assert_eq!(scene.unwrap().triangle_count(), 1);
+    // A byte order mark is not in the way.
+    let bytes = [b"\xef\xbb\xbf", &hostile::gltf(|_| ())[..]].concat();
+    assert!(load_in(folder(&[("a.gltf", &bytes)]).path(), "a.gltf").is_ok());
+}
+
+#[test]
+fn images_that_say_nothing_are_warnings() {
+    let scene = gltf(|j| j["images"] = json!([{}])).unwrap();
+    warned(&scene, 1, &["image 0: it names neither a file nor a buffer view"]);
+    // The format stands in the bytes, whether the file says it or not.
+    let scene = gltf(|j| j["images"] = json!([{ "bufferView": 0 }])).unwrap();
+    warned(&scene, 1, &["image 0: the texture cannot be decoded"]);
+    // Without its texture the material would glow all over.
+    assert_eq!(scene.materials[0].emissive, Vec3::ZERO);
+}
+
+#[test]
+fn emissive_textures_keep_their_transform() {
+    let scene = gltf(|j| {
+        let material = &mut j["materials"][0];
+        material["emissiveTexture"]["extensions"] =
+            json!({ "KHR_texture_transform": { "offset": [0.5, 0.25], "scale": [2, 4] } });
+        material["pbrMetallicRoughness"] = json!({ "baseColorTexture": { "index": 0 } });
+        j["extensionsUsed"] = json!(["KHR_texture_transform"]);
+    });
+    let scene = scene.unwrap();
+    let transform = scene.materials[0].emissive_texture.unwrap().transform;
+    assert_eq!(transform.transform_point2(Vec2::ONE), Vec2::new(2.5, 4.25));
+    assert_eq!(scene.warnings, [""; 0]);
+
+    let scene = gltf(|j| {
+        let material = &mut j["materials"][0];
+        material["emissiveTexture"]["texCoord"] = 1.into();
+        material["pbrMetallicRoughness"] = json!({ "baseColorTexture": { "index": 0 } });
+    });
+    warned(&scene.unwrap(), 1, &["material ''", "texture coordinates 1"]);
+}
+
+#[test]
+fn findings_of_the_library_are_errors_of_one_line() {
+    let error = gltf(|j| j["accessors"][0]["componentType"] = 7.into()).unwrap_err().to_string();
+    let wanted = "a.gltf, accessors[0].componentType: its value is not one that glTF allows; \
+                  export the file again";
+    assert!(error.ends_with(wanted), "{error}");
+    let error = gltf(|j| {
+        j["nodes"][0]["name"] = "a\nb".into();
+        j["nodes"][0]["scale"] = json!([1e39, 1, 1]);
+    });
+    let error = error.unwrap_err().to_string();
+    assert!(error.contains("object 'a b'") && !error.contains('\n'), "{error}");
+    for (key, version) in [("version", "9.0"), ("version", "1.0"), ("minVersion", "3.0")] {
+        let error = gltf(|j| j["asset"][key] = version.into()).unwrap_err().to_string();
+        assert!(error.ends_with(&format!("it wants glTF {version}; export it as glTF 2.0")));
+    }
+    assert!(gltf(|j| j["asset"]["version"] = "2.1".into()).is_ok());
+}
