@@ -8,7 +8,7 @@ use clap::Args;
 use crate::capture::{CameraOptions, Capture, CaptureOptions, Faces, Order, PatternKind};
 use crate::cli::arguments::{self, colour, numbers, option, samples, size};
 use crate::cli::console::{Console, grouped, shown};
-use crate::cli::files::check;
+use crate::cli::files::{check, check_scene};
 use crate::error::{Error, Result};
 use crate::output::OutputFile;
 use crate::scene;
@@ -87,6 +87,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     if let Some(texture) = &arguments.texture {
         scene.apply_texture(texture)?;
     }
+    check_scene(&scene, &[&arguments.output])?;
     if arguments.white {
         scene.whiten();
     }

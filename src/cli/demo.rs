@@ -10,7 +10,7 @@ use crate::capture::{Capture, CaptureOptions};
 use crate::cli::arguments;
 use crate::cli::capture::why_empty;
 use crate::cli::console::{Console, grouped, shown, table};
-use crate::cli::files::{Json, check, report};
+use crate::cli::files::{Json, check, check_scene, report};
 use crate::design::{Configured, configure};
 use crate::error::{Error, Result};
 use crate::output::OutputFile;
@@ -61,24 +61,29 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(|e| Error::io("create", folder, e))?;
     let names = picture_paths(folder, &plan.designs);
     let outputs = names.iter().chain([&path]).map(|p| &**p).chain(Json::path(&arguments.json));
-    check(scene_path.as_slice(), &outputs.collect::<Vec<_>>())?;
+    let outputs: Vec<&Path> = outputs.collect();
+    check(scene_path.as_slice(), &outputs)?;
     let file = OutputFile::create(&path)?;
     let create = |path| PictureFile::create(path, SIDE, SIDE);
     let files = names.iter().map(create).collect::<Result<Vec<_>>>()?;
     let json = Json::open(&arguments.json)?;
-    // Standard output holds either JSON or text.
-    let say = |text: std::fmt::Arguments<'_>| match json {
-        Some(Json::Standard) => Ok(()),
-        _ => console.print(text),
+    // Standard output holds either JSON or text. Where nobody reads it any more the
+    // files are written all the same.
+    let aloud = !matches!(json, Some(Json::Standard));
+    let mut said = Ok(());
+    let mut say = |text: std::fmt::Arguments<'_>| {
+        if aloud && said.is_ok() {
+            said = console.print(text);
+        }
     };
 
-    let fragments = capture(source, file, console)?;
+    let fragments = capture(source, file, &outputs, console)?;
     say(format_args!(
         "captured {} at {SIDE}x{SIDE}: {} fragments in {}",
         shown(source),
         grouped(fragments),
         shown(path.display())
-    ))?;
+    ));
     let trace = Trace::open(&path)?;
     let progress = console.progress("replaying", "replays");
     let measured = measure(&trace, &plan, 512 << 20, |what, done, total| {
@@ -89,10 +94,10 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
 
     say(format_args!(
         "\nerror against exact, RMSE in 8-bit units of the pixels that hold fragments, {SEEDS} seeds"
-    ))?;
-    say(format_args!("{}", error_table(&measured.runs)))?;
+    ));
+    say(format_args!("{}", error_table(&measured.runs)));
     if let Some(comparison) = comparison(&measured.runs) {
-        say(format_args!("\n{comparison}"))?;
+        say(format_args!("\n{comparison}"));
     }
     let saved = save(files, &measured);
     if saved.is_ok() {
@@ -103,7 +108,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
             shown(folder.display()),
             shown(path.display()),
             SIDE / 2
-        ))?;
+        ));
     }
     let document = Document {
         scene: source,
@@ -114,7 +119,8 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         runs: measured.runs.iter().map(|m| &m.run).collect(),
     };
     // The text has been printed.
-    saved.and(json.map_or(Ok(()), |json| report(Some(json), &document, console, || Ok(()))))
+    let reported = json.map_or(Ok(()), |json| report(Some(json), &document, console, || Ok(())));
+    saved.and(reported).and(said)
 }
 
 /// Names that every file system takes.
@@ -155,8 +161,9 @@ fn save(mut files: Vec<PictureFile>, measured: &Measurements) -> Result<()> {
     files.into_iter().try_for_each(PictureFile::commit)
 }
 
-fn capture(source: &str, file: OutputFile, console: &Console) -> Result<u64> {
+fn capture(source: &str, file: OutputFile, outputs: &[&Path], console: &Console) -> Result<u64> {
     let scene = scene::load(source)?;
+    check_scene(&scene, outputs)?;
     for warning in &scene.warnings {
         console.warn(warning);
     }

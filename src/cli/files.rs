@@ -9,6 +9,7 @@ use serde::Serialize;
 use crate::cli::console::Console;
 use crate::error::{Error, Result};
 use crate::output::{OutputFile, same_file};
+use crate::scene::Scene;
 use crate::trace::Trace;
 
 /// Refuses a folder in place of an input, and an output that is an input or
@@ -40,6 +41,13 @@ pub(super) fn check(inputs: &[&Path], outputs: &[&Path]) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// Refuses an output that is one of the files that a scene was read from: those that
+/// its own file names are known only then. Outputs are still under construction.
+pub(super) fn check_scene(scene: &Scene, outputs: &[&Path]) -> Result<()> {
+    let files: Vec<&Path> = scene.files.iter().map(|file| &**file).collect();
+    check(&files, outputs)
 }
 
 fn refuse_input<T>(path: &Path, kind: io::ErrorKind, why: &str) -> Result<T> {

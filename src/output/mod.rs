@@ -44,6 +44,10 @@ impl OutputFile {
         let path = path.as_ref();
         let refuse =
             |action, kind, why: String| Err(Error::io(action, path, io::Error::new(kind, why)));
+        if path.as_os_str().as_encoded_bytes().ends_with(b"/") && !path.is_dir() {
+            let why = "that is a folder's name; name a file".to_string();
+            return refuse("create", io::ErrorKind::InvalidInput, why);
+        }
         // Renaming onto a symbolic link would replace the link: write where it leads.
         let destination = place::destination(path);
         let existing = fs::metadata(&destination).ok();
@@ -86,7 +90,11 @@ impl OutputFile {
         let (file, partial) = match Partial::create(folder) {
             Ok(made) => made,
             // The error itself speaks of the temporary name.
-            Err(e) => return Err(Error::io("create", path, e.kind().into())),
+            Err(e) => {
+                let kind = || io::Error::from(e.kind());
+                let plain = e.raw_os_error().map_or_else(kind, io::Error::from_raw_os_error);
+                return Err(Error::io("create", path, plain));
+            }
         };
         if let Some(m) = existing {
             // Not every file system has permissions to set.

@@ -14,6 +14,10 @@ pub(super) fn destination(path: &Path) -> PathBuf {
     let mut path = path.to_path_buf();
     // Links that lead round in a circle end here.
     for _ in 0..40 {
+        // A pipe behind /dev/stdout or /dev/fd has no name of its own.
+        if fs::metadata(&path).is_ok_and(|m| !m.is_file() && !m.is_dir()) {
+            return path;
+        }
         if let Ok(place) = fs::canonicalize(&path) {
             return place;
         }

@@ -11,7 +11,7 @@ mod material;
 mod obj_file;
 mod texture;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::{DAffine3, DVec3, Vec2, Vec3, Vec4};
 
@@ -39,6 +39,8 @@ pub struct Scene {
     pub textures: Vec<Texture>,
     /// From where it is best seen.
     pub view: View,
+    /// The files that it was read from.
+    pub files: Vec<PathBuf>,
     /// What could not be honoured, for the user to know.
     pub warnings: Vec<String>,
 }
@@ -245,6 +247,7 @@ impl Scene {
     /// together.
     pub fn apply_texture(&mut self, path: &Path) -> Result<()> {
         let texture = Texture::read(path)?;
+        self.files.push(path.to_path_buf());
         let has_alpha = texture.has_alpha();
         let texture = self.add_texture(texture)?;
         for material in self.materials.iter_mut().filter(|m| m.base_texture.is_none()) {

@@ -5,6 +5,7 @@ mod material;
 mod primitive;
 
 use std::borrow::Cow;
+use std::cell::RefCell;
 use std::collections::HashMap;
 use std::path::{Component, Path, PathBuf};
 
@@ -27,6 +28,7 @@ pub(super) fn load(path: &Path) -> Result<Scene> {
         folder: path.parent().unwrap_or(Path::new("")).to_path_buf(),
         document: &document,
         buffers: Vec::new(),
+        files: RefCell::new(vec![path.to_path_buf()]),
         scene: Scene { source: file_name(path), ..Scene::default() },
         materials: HashMap::new(),
         textures: HashMap::new(),
@@ -42,7 +44,7 @@ pub(super) fn load(path: &Path) -> Result<Scene> {
     for node in scene.nodes() {
         loader.node(&node, DMat4::IDENTITY, 0)?;
     }
-    Ok(loader.scene)
+    Ok(Scene { files: loader.files.into_inner(), ..loader.scene })
 }
 
 struct Loader<'a> {
@@ -50,6 +52,8 @@ struct Loader<'a> {
     folder: PathBuf,
     document: &'a gltf::Document,
     buffers: Vec<Cow<'a, [u8]>>,
+    /// What has been read.
+    files: RefCell<Vec<PathBuf>>,
     scene: Scene,
     /// By the file's number; `None` is glTF's default material.
     materials: HashMap<Option<usize>, usize>,
@@ -92,7 +96,9 @@ impl<'a> Loader<'a> {
             ));
         }
         let path = self.folder.join(relative);
-        file::read(&path).map_err(|e| self.bad(part, e, "put the file beside the scene"))
+        let bytes = file::read(&path);
+        self.files.borrow_mut().push(path);
+        bytes.map_err(|e| self.bad(part, e, "put the file beside the scene"))
     }
 
     fn read_buffers(&self, blob: Option<Cow<'a, [u8]>>) -> Result<Vec<Cow<'a, [u8]>>> {

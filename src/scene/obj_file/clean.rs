@@ -41,6 +41,8 @@ pub(super) struct Cleaner<'a> {
     undefined: Option<(String, usize, usize)>,
     not_drawn: usize,
     colours_dropped: bool,
+    /// Corners that name an attribute of which there was none yet.
+    too_early: [usize; 3],
     text: Vec<u8>,
     given: usize,
 }
@@ -66,6 +68,7 @@ impl<'a> Cleaner<'a> {
             undefined: None,
             not_drawn: 0,
             colours_dropped: false,
+            too_early: [0; 3],
             // What corners without texture coordinates or normals name: `tobj`
             // wants all corners to have them, or none.
             text: b"o 0\nvt nan nan\nvn nan nan nan\n".to_vec(),
@@ -136,9 +139,18 @@ impl<'a> Cleaner<'a> {
 
     /// A texture coordinate (`kind` 1) or a normal (`kind` 2).
     fn attribute(&mut self, kind: usize, statement: &Statement) -> Result<(), String> {
-        let numbers = statement.words().take(kind + 1).map(Statement::number);
-        let numbers = numbers.collect::<Result<Vec<f32>, _>>()?;
+        // Exporters write normals of flat triangles that are no numbers: as good as none.
+        let number = |word: &str| match word.parse::<f32>() {
+            Ok(number) if !number.is_finite() => Ok(f32::NAN),
+            _ => Statement::number(word),
+        };
+        let numbers = statement.words().take(kind + 1).map(number);
+        let mut numbers = numbers.collect::<Result<Vec<f32>, _>>()?;
+        if numbers.iter().any(|n| n.is_nan()) {
+            numbers.fill(f32::NAN);
+        }
         match (kind, &numbers[..]) {
+            (1, [u]) if u.is_nan() => self.write(format_args!("vt nan nan\n")),
             // The second coordinate may be left out.
             (1, [u]) => self.write(format_args!("vt {u} 0\n")),
             (1, [u, v]) => self.write(format_args!("vt {u} {v}\n")),
@@ -167,6 +179,10 @@ impl<'a> Cleaner<'a> {
                     // Some exporters name attributes that the file does not have.
                     Some(part) if !part.is_empty() && (kind == 0 || self.counts[kind] > 0) => {
                         Some(self.index(part, kind, statement)?)
+                    }
+                    Some(part) if !part.is_empty() => {
+                        self.too_early[kind] += 1;
+                        None
                     }
                     _ => None,
                 };
@@ -246,6 +262,15 @@ impl<'a> Cleaner<'a> {
         if self.not_drawn > 0 {
             let n = self.not_drawn;
             warnings.push(format!("{source}: {n} statements of points and lines are not drawn"));
+        }
+        for kind in [1, 2] {
+            // Where the file has none at all, nothing is lost.
+            if self.too_early[kind] > 0 && self.counts[kind] > 0 {
+                let (n, what) = (self.too_early[kind], KINDS[kind]);
+                warnings.push(format!(
+                    "{source}: {n} corners of faces come before the first {what}; theirs are ignored"
+                ));
+            }
         }
         if self.colours_dropped {
             let what = "only some vertices have colours, and the first has none; all are ignored";

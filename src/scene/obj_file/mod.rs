@@ -16,7 +16,8 @@ use crate::scene::{Material, Mesh, Scene, Shape, file_name};
 /// Loads the OBJ file at `path`; materials and textures that are missing become
 /// warnings.
 pub(super) fn load(path: &Path) -> Result<Scene> {
-    let mut scene = Scene { source: file_name(path), ..Scene::default() };
+    let files = vec![path.to_path_buf()];
+    let mut scene = Scene { source: file_name(path), files, ..Scene::default() };
     let options = tobj::LoadOptions { triangulate: true, single_index: true, ..Default::default() };
     let mut cleaner = Cleaner::open(path, &mut scene)?;
     // The cleaner hands no `mtllib` on.

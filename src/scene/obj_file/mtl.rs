@@ -86,9 +86,10 @@ impl Library {
 
     fn read_file(&mut self, path: &Path, scene: &mut Scene) -> Result<()> {
         let mut lines = Lines::open(path)?;
+        scene.files.push(path.to_path_buf());
         let mut current: Option<Definition> = None;
         while let Some(statement) = lines.next()? {
-            if statement.keyword() == "newmtl" {
+            if statement.keyword().eq_ignore_ascii_case("newmtl") {
                 if let Some(done) = current.take() {
                     self.add(done, scene);
                 }
@@ -150,7 +151,9 @@ impl Library {
         let index = match self.textures.get(&key) {
             Some(index) => *index,
             None => {
-                let read = Texture::read_as(&self.folder.join(name), encoding);
+                let path = self.folder.join(name);
+                let read = Texture::read_as(&path, encoding);
+                scene.files.push(path);
                 let index = match read.and_then(|texture| scene.add_texture(texture)) {
                     Ok(index) => Some(index),
                     Err(e) => {

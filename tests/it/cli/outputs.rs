@@ -6,11 +6,14 @@ use super::*;
 fn an_output_is_never_an_input_nor_another_output() {
     let place = Workplace::with_trace();
     place.good(&["replay", "t.arrow", "-o", "a.exr"]);
-    let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    let triangle = "mtllib tri.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
     fs::write(place.path("tri.obj"), triangle).unwrap();
+    fs::write(place.path("tri.mtl"), "newmtl m\nmap_Kd a.exr\n").unwrap();
     fs::create_dir(place.path("sub")).unwrap();
     let mut cases: Vec<&[&str]> = vec![
         &["capture", "tri.obj", "-o", "tri.obj"],
+        &["capture", "tri.obj", "-o", "tri.mtl"],
+        &["capture", "tri.obj", "-o", "a.exr"],
         &["capture", "builtin:ramps", "--texture", "a.exr", "-o", "sub/../a.exr"],
         &["info", "t.arrow", "--json", "t.arrow"],
         &["explain", "t.arrow", "--pixel", "1,1", "--json", "./t.arrow"],
@@ -29,7 +32,7 @@ fn an_output_is_never_an_input_nor_another_output() {
         cases.push(&["replay", "link.arrow", "--json", "t.arrow"]);
         cases.push(&["info", "t.arrow", "--json", "hard.arrow"]);
     }
-    let inputs = ["t.arrow", "a.exr", "tri.obj"];
+    let inputs = ["t.arrow", "a.exr", "tri.obj", "tri.mtl"];
     let read = |name| fs::read(place.path(name)).unwrap();
     let before = inputs.map(read);
     for arguments in cases {
@@ -189,6 +192,43 @@ fn a_program_told_to_end_leaves_nothing_half_done() {
         assert_eq!(files(place.0.path()), ["big.arrow"], "{signal}");
         assert_eq!(fs::read(place.path("big.arrow")).unwrap(), b"old");
     }
+}
+
+#[test]
+#[cfg(unix)]
+fn pipes_are_written_directly() {
+    let place = Workplace::with_trace();
+    for command in [
+        "\"$PROGRAM\" info t.arrow --json /dev/stdout | grep -q fragments",
+        "exec 3>&1; \"$PROGRAM\" capture builtin:ramps --size 9x9 -o /dev/fd/3 3>&1 >/dev/null | grep -q ARROW1",
+    ] {
+        let (code, error) = shell(&place, command);
+        assert_eq!((code, &*error), (Some(0), ""), "{command}");
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn a_name_of_a_folder_names_no_file() {
+    let place = Workplace::with_trace();
+    let before = files(place.0.path());
+    for arguments in
+        [&["capture", "builtin:ramps", "-o", "new/"][..], &["info", "t.arrow", "--json", "new/"]]
+    {
+        let (code, error) = place.bad(arguments);
+        assert_eq!(code, 1, "{error}");
+        assert!(error.contains("folder"), "{error}");
+    }
+    assert_eq!(files(place.0.path()), before);
+}
+
+#[test]
+#[cfg(unix)]
+fn the_demo_is_whole_although_nobody_reads_it() {
+    let place = Workplace::new();
+    let demo = "\"$PROGRAM\" demo --scene builtin:ramps -o out | head -n 1";
+    assert_eq!(shell(&place, demo).0, Some(0));
+    assert_eq!(files(&place.path("out")).len(), 20);
 }
 
 #[test]

@@ -133,6 +133,31 @@ fn corners_without_texture_coordinates_or_normals_are_filled_in() {
 }
 
 #[test]
+fn attributes_that_are_no_numbers_count_as_none() {
+    let scene = obj(format!("{TRIANGLE}vt inf 0\nvn nan nan nan\nf 1/1/1 2/1/1 3/1/1\n")).unwrap();
+    let mesh = mesh(&scene, 0);
+    assert!(mesh.normals.is_empty() && mesh.uvs.is_empty());
+    assert!(obj(format!("{TRIANGLE}vn 0 x 1\nf 1 2 3\n")).is_err());
+}
+
+#[test]
+fn attributes_that_come_after_their_corners_are_missed_aloud() {
+    let scene = obj(format!("{TRIANGLE}f 1/1 2/1 3/1\nvt 0.5 0.5\nf 1/1 2/1 3/1\n")).unwrap();
+    warned(&scene, 1, &["3 corners", "first texture coordinate"]);
+    // Where there are none at all, nothing is missed.
+    assert!(obj(format!("{TRIANGLE}f 1/1 2/1 3/1\n")).unwrap().warnings.is_empty());
+}
+
+#[test]
+fn keywords_of_mtl_have_no_case() {
+    let scene = with_mtl("NEWMTL other\nKD 1 0 0\nNewmtl m\nkd 0 1 0\nD 0.5\n");
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    let materials = scene.materials.iter().map(|m| (&*m.name, m.base));
+    let expected = [("other", Vec4::new(1.0, 0.0, 0.0, 1.0)), ("m", Vec4::new(0.0, 1.0, 0.0, 0.5))];
+    assert_eq!(materials.take(2).collect::<Vec<_>>(), expected);
+}
+
+#[test]
 fn alpha_maps_are_linear() {
     let grey8 = png(image::GrayImage::from_pixel(2, 2, image::Luma([128])));
     let rgb8 = png(image::RgbImage::from_pixel(2, 2, image::Rgb([128; 3])));
