@@ -11,6 +11,7 @@ use crate::cli::files::open_trace;
 use crate::design::{Configured, configure};
 use crate::error::{Error, Result};
 use crate::param::{Options, parse_setting};
+use crate::scene;
 use crate::trace::{SamplePattern, Trace};
 
 /// A parser for an enumeration of [`Options`]: the names and helps are its own.
@@ -64,7 +65,7 @@ pub(super) fn scene(name: &OsStr) -> Result<(&str, Option<&Path>)> {
             "rename the file or its folder",
         ));
     };
-    Ok((text, (!text.starts_with("builtin:")).then(|| Path::new(text))))
+    Ok((text, scene::path_of(text)))
 }
 
 fn setting(text: &str) -> Result<(String, String), String> {

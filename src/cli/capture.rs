@@ -11,9 +11,9 @@ use crate::cli::console::{Console, grouped, shown};
 use crate::cli::files::{check, check_scene};
 use crate::error::{Error, Result};
 use crate::output::OutputFile;
-use crate::scene;
+use crate::scene::{self, Scene};
 use crate::trace::{
-    ColourFormat, ColumnId, Compression, Header, Scalar, TraceWriter, WriteOptions,
+    ColourFormat, ColumnId, Compression, Header, Scalar, TraceWriter, WriteOptions, Written,
 };
 
 /// Draw a scene and record its fragments as a trace
@@ -91,9 +91,6 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     if arguments.white {
         scene.whiten();
     }
-    for warning in &scene.warnings {
-        console.warn(warning);
-    }
     let (width, height) = arguments.size;
     let options = CaptureOptions {
         width,
@@ -112,10 +109,31 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
             field_of_view: arguments.fov,
         },
     };
-    let capture = Capture::new(&scene, &options)?;
     let write = WriteOptions { compression: arguments.compress, ..WriteOptions::default() };
-    let place = arguments.output.display().to_string();
-    let mut writer = TraceWriter::new(file, &place, capture.header().clone(), write)?;
+    let written = record(&scene, &options, write, file, console)?;
+    console.print(format_args!(
+        "{}: {} fragments, {:.1} MB, content {}",
+        shown(arguments.output.display()),
+        grouped(written.rows),
+        written.bytes as f64 / 1e6,
+        &written.content[..16],
+    ))
+}
+
+/// Captures `scene` into `file` and puts it in its place, with the scene's warnings.
+pub(super) fn record(
+    scene: &Scene,
+    options: &CaptureOptions,
+    write: WriteOptions,
+    file: OutputFile,
+    console: &Console,
+) -> Result<Written> {
+    for warning in &scene.warnings {
+        console.warn(warning);
+    }
+    let capture = Capture::new(scene, options)?;
+    let (header, place) = (capture.header().clone(), file.path().display().to_string());
+    let mut writer = TraceWriter::new(file, &place, header, write)?;
     let progress = console.progress("capturing", "triangles");
     capture.draw(&mut writer, |done, total| progress.set(done, total))?;
     drop(progress);
@@ -124,17 +142,11 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     if written.rows == 0 {
         console.warn(&format!("the trace has no fragments: {}", why_empty(capture.header())));
     }
-    console.print(format_args!(
-        "{}: {} fragments, {:.1} MB, content {}",
-        shown(place),
-        grouped(written.rows),
-        written.bytes as f64 / 1e6,
-        &written.content[..16],
-    ))
+    Ok(written)
 }
 
 /// Why nothing was drawn, as far as it is known.
-pub(super) fn why_empty(header: &Header) -> &'static str {
+fn why_empty(header: &Header) -> &'static str {
     match header.constants.get(&ColumnId::Alpha) {
         // What is next to transparent is not recorded: half a step of 16 bits.
         Some(Scalar::Real(alpha)) if *alpha < 1.0 / 65536.0 => "all of the scene is transparent",

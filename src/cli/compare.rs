@@ -73,7 +73,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let e = errors(&a, &b, &Region::frame(a.grid()));
     let identical = a.hash() == b.hash();
     let saved = output.map_or(Ok(()), |mut file| {
-        let difference = a.zip(&b, |a, b| std::array::from_fn(|i| a[i] - b[i]));
+        let difference = a.minus(&b);
         file.write(&[Layer { name: "error", picture: &difference }])?;
         file.commit()
     });

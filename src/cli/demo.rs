@@ -6,18 +6,18 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde::Serialize;
 
-use crate::capture::{Capture, CaptureOptions};
+use crate::capture::CaptureOptions;
 use crate::cli::arguments;
-use crate::cli::capture::why_empty;
+use crate::cli::capture::record;
 use crate::cli::console::{Console, grouped, shown, table};
-use crate::cli::files::{Json, check, check_scene, report};
+use crate::cli::files::{Json, check, check_scene, report, write_pictures};
 use crate::design::{Configured, configure};
 use crate::error::{Error, Result};
 use crate::output::OutputFile;
-use crate::picture::{Layer, PictureFile};
+use crate::picture::PictureFile;
 use crate::scene;
 use crate::study::{Measured, Measurements, Plan, Run, measure};
-use crate::trace::{Trace, TraceWriter, WriteOptions};
+use crate::trace::{Trace, WriteOptions};
 
 /// Do the main job on a built-in scene: capture it, replay it through 'lk' and
 /// through 'enderton', stratified and naive, at 4, 8 and 16 samples, hold them
@@ -77,7 +77,10 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         }
     };
 
-    let fragments = capture(source, file, &outputs, console)?;
+    let scene = scene::load(source)?;
+    check_scene(&scene, &outputs)?;
+    let options = CaptureOptions { width: SIDE, height: SIDE, ..CaptureOptions::default() };
+    let fragments = record(&scene, &options, WriteOptions::default(), file, console)?.rows;
     say(format_args!(
         "captured {} at {SIDE}x{SIDE}: {} fragments in {}",
         shown(source),
@@ -143,43 +146,15 @@ fn picture_paths(folder: &Path, designs: &[Configured]) -> Vec<PathBuf> {
 
 /// Writes the pictures, in the order of [`picture_paths`].
 fn save(mut files: Vec<PictureFile>, measured: &Measurements) -> Result<()> {
-    let mut rest = files.iter_mut();
-    for m in &measured.runs {
+    let mut rest = files.chunks_mut(2);
+    for (m, pair) in measured.runs.iter().zip(rest.by_ref()) {
         let at = SAMPLES.iter().position(|s| *s == m.run.samples).expect("a sample count of ours");
-        let reference = &measured.references[at];
-        let error = m.picture.zip(reference, |a, b| std::array::from_fn(|i| a[i] - b[i]));
-        let layers = [
-            Layer { name: "colour", picture: &m.picture },
-            Layer { name: "reference", picture: reference },
-            Layer { name: "error", picture: &error },
-        ];
-        rest.by_ref().take(2).try_for_each(|file| file.write(&layers))?;
+        write_pictures(pair, &m.picture, Some(&measured.references[at]))?;
     }
-    if let (Some(file), Some(reference)) = (rest.next(), measured.references.last()) {
-        file.write(&[Layer { name: "colour", picture: reference }])?;
+    if let (Some(exact), Some(reference)) = (rest.next(), measured.references.last()) {
+        write_pictures(exact, reference, None)?;
     }
     files.into_iter().try_for_each(PictureFile::commit)
-}
-
-fn capture(source: &str, file: OutputFile, outputs: &[&Path], console: &Console) -> Result<u64> {
-    let scene = scene::load(source)?;
-    check_scene(&scene, outputs)?;
-    for warning in &scene.warnings {
-        console.warn(warning);
-    }
-    let options = CaptureOptions { width: SIDE, height: SIDE, ..CaptureOptions::default() };
-    let capture = Capture::new(&scene, &options)?;
-    let (header, place) = (capture.header().clone(), file.path().display().to_string());
-    let mut writer = TraceWriter::new(file, &place, header, WriteOptions::default())?;
-    let progress = console.progress("capturing", "triangles");
-    capture.draw(&mut writer, |done, total| progress.set(done, total))?;
-    drop(progress);
-    let (file, written) = writer.finish()?;
-    file.commit()?;
-    if written.rows == 0 {
-        console.warn(&format!("the trace has no fragments: {}", why_empty(capture.header())));
-    }
-    Ok(written.rows)
 }
 
 /// What the table's last rows say of the claim: LK against what it improves on.

@@ -9,6 +9,7 @@ use serde::Serialize;
 use crate::cli::console::Console;
 use crate::error::{Error, Result};
 use crate::output::{OutputFile, same_file};
+use crate::picture::{Layer, Picture, PictureFile};
 use crate::scene::Scene;
 use crate::trace::Trace;
 
@@ -48,6 +49,22 @@ pub(super) fn check(inputs: &[&Path], outputs: &[&Path]) -> Result<()> {
 pub(super) fn check_scene(scene: &Scene, outputs: &[&Path]) -> Result<()> {
     let files: Vec<&Path> = scene.files.iter().map(|file| &**file).collect();
     check(&files, outputs)
+}
+
+/// Writes a picture to each of `files`: a PNG shows it, an EXR holds it in layers
+/// with the reference and the error, where there is a reference.
+pub(super) fn write_pictures(
+    files: &mut [PictureFile],
+    picture: &Picture,
+    reference: Option<&Picture>,
+) -> Result<()> {
+    let error = reference.map(|reference| picture.minus(reference));
+    let mut layers = vec![Layer { name: "colour", picture }];
+    if let (Some(reference), Some(error)) = (reference, &error) {
+        layers.push(Layer { name: "reference", picture: reference });
+        layers.push(Layer { name: "error", picture: error });
+    }
+    files.iter_mut().try_for_each(|file| file.write(&layers))
 }
 
 fn refuse_input<T>(path: &Path, kind: io::ErrorKind, why: &str) -> Result<T> {

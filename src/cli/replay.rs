@@ -8,12 +8,12 @@ use serde::Serialize;
 
 use crate::cli::arguments::RunArguments;
 use crate::cli::console::{Console, grouped, shown};
-use crate::cli::files::{Json, check, report};
+use crate::cli::files::{Json, check, report, write_pictures};
 use crate::design::{Configured, REFERENCE, configure};
 use crate::error::Result;
 use crate::metrics::{Ensemble, EnsembleErrors, PixelClasses, Region};
 use crate::param::Values;
-use crate::picture::{Layer, Picture, PictureFile};
+use crate::picture::{Picture, PictureFile};
 use crate::rop::{EventCounts, Promises, ReplayOptions, Replayed, StateBits};
 use crate::trace::Trace;
 
@@ -78,7 +78,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let (design, trace, samples) = arguments.run.open(console)?;
     let header = trace.header();
     let create = |path| PictureFile::create(path, header.width, header.height);
-    let files = arguments.output.iter().map(create).collect::<Result<Vec<_>>>()?;
+    let mut files = arguments.output.iter().map(create).collect::<Result<Vec<_>>>()?;
     let json = Json::open(&arguments.json)?;
     let seed = arguments.run.seed;
     let progress = console.progress("replaying", "fragments");
@@ -114,7 +114,9 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     };
     drop(progress);
 
-    let saved = save(files, &first.picture, reference.as_ref());
+    // No file appears unless all could be written.
+    let saved = write_pictures(&mut files, &first.picture, reference.as_ref())
+        .and_then(|()| files.into_iter().try_for_each(PictureFile::commit));
     let events = first.events.clone().unwrap_or_default();
     let document = Document {
         trace: trace.place(),
@@ -144,19 +146,6 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         print_events(&first, &events, &design, console)
     });
     saved.and(reported)
-}
-
-/// PNG shows the picture; EXR holds it in layers with the reference and the error.
-/// No file appears unless all could be written.
-fn save(mut files: Vec<PictureFile>, picture: &Picture, reference: Option<&Picture>) -> Result<()> {
-    let error = reference.map(|r| picture.zip(r, |a, b| std::array::from_fn(|i| a[i] - b[i])));
-    let mut layers = vec![Layer { name: "colour", picture }];
-    if let (Some(reference), Some(error)) = (reference, &error) {
-        layers.push(Layer { name: "reference", picture: reference });
-        layers.push(Layer { name: "error", picture: error });
-    }
-    files.iter_mut().try_for_each(|file| file.write(&layers))?;
-    files.into_iter().try_for_each(PictureFile::commit)
 }
 
 fn by_region(

@@ -112,6 +112,14 @@ impl Picture {
         result
     }
 
+    /// This picture minus `other`.
+    ///
+    /// # Panics
+    /// Where the frames differ in size.
+    pub fn minus(&self, other: &Picture) -> Picture {
+        self.zip(other, |a, b| std::array::from_fn(|i| a[i] - b[i]))
+    }
+
     /// How many of its pixels have a channel that is NaN or infinite.
     pub fn not_finite(&self) -> u64 {
         let finite = |x, y| self.get(x, y).iter().all(|c| c.is_finite());

@@ -381,6 +381,13 @@ fn check_mesh(mesh: &Mesh, place: &str) -> Result<()> {
     Ok(())
 }
 
+const BUILTIN: &str = "builtin:";
+
+/// The file that a scene's `source` names; `None` for a built-in one.
+pub fn path_of(source: &str) -> Option<&Path> {
+    (!source.starts_with(BUILTIN)).then(|| Path::new(source))
+}
+
 /// Loads the scene that `source` names: `builtin:NAME[:key=value,…]`, or a file
 /// whose ending says its format.
 ///
@@ -389,7 +396,7 @@ fn check_mesh(mesh: &Mesh, place: &str) -> Result<()> {
 /// file cannot be read, [`Error::Invalid`] where it is damaged or holds nothing
 /// to draw.
 pub fn load(source: &str) -> Result<Scene> {
-    let mut scene = match source.strip_prefix("builtin:") {
+    let mut scene = match source.strip_prefix(BUILTIN) {
         Some(spec) => builtin::build(spec)?,
         None => {
             let path = Path::new(source);

@@ -5,6 +5,7 @@ pub mod publications;
 use std::time::Instant;
 
 use serde::Serialize;
+use statrs::statistics::{Data, OrderStatistics};
 
 use crate::design::{Configured, REFERENCE, configure};
 use crate::error::Result;
@@ -151,17 +152,8 @@ pub fn measure(
 }
 
 /// The middle of `values`, or the mean of the two in the middle.
-///
-/// # Panics
-/// Where there are none.
 fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    if values.len().is_multiple_of(2) {
-        values[middle - 1].midpoint(values[middle])
-    } else {
-        values[middle]
-    }
+    OrderStatistics::median(&mut Data::new(values))
 }
 
 #[cfg(test)]

@@ -14,14 +14,11 @@ impl Loader<'_> {
             return Ok(*index);
         }
         let pbr = material.pbr_metallic_roughness();
-        let base_texture = match pbr.base_color_texture() {
-            None => None,
-            Some(info) => self.texture_use(&info)?,
+        let mut texture_use = |info: Option<gltf::texture::Info<'_>>| {
+            info.map(|info| self.texture_use(&info)).transpose().map(Option::flatten)
         };
-        let emissive_texture = match material.emissive_texture() {
-            None => None,
-            Some(info) => self.texture_use(&info)?,
-        };
+        let base_texture = texture_use(pbr.base_color_texture())?;
+        let emissive_texture = texture_use(material.emissive_texture())?;
         if let [Some(base), Some(emissive)] = texture_sets(material)
             && base != emissive
         {
@@ -107,6 +104,7 @@ impl Loader<'_> {
         self.textures.insert(key, index);
         Ok(index)
     }
+
     /// The bytes of an image. The library's own way to them panics where the file
     /// says neither a URI nor a view, or a view without the format, which the bytes
     /// themselves tell.

@@ -7,6 +7,7 @@ use serde::Serialize;
 use crate::capture::{CameraOptions, CaptureOptions, Faces, Order};
 use crate::error::Result;
 use crate::metrics::{Estimate, PixelClasses, errors};
+use crate::scene;
 use crate::study::publications::{Effort, MEMORY, capture, designs, replay};
 use crate::study::{Plan, Run, measure};
 use crate::trace::{SampleMask, Statistics, Trace, statistics};
@@ -153,10 +154,10 @@ impl Table1Scene {
 impl Table1Scene {
     /// The scene as it can be loaded; `None` for a model that is not there.
     pub fn locate(&self, models: Option<&Path>) -> Option<String> {
-        if self.source.starts_with("builtin:") {
+        let Some(file) = scene::path_of(self.source) else {
             return Some(self.source.to_string());
-        }
-        let path = models?.join(self.source);
+        };
+        let path = models?.join(file);
         path.is_file().then(|| path.display().to_string())
     }
 
