@@ -17,7 +17,8 @@ use crate::trace::Trace;
 /// another output: writing it would destroy what was read or written before.
 pub(super) fn check(inputs: &[&Path], outputs: &[&Path]) -> Result<()> {
     if let Some(input) = inputs.iter().find(|i| i.is_dir()) {
-        return refuse_input(input, io::ErrorKind::IsADirectory, "it is a folder; name a file");
+        let why = io::Error::new(io::ErrorKind::IsADirectory, "it is a folder; name a file");
+        return Err(Error::io("read", input, why));
     }
     for (i, output) in outputs.iter().enumerate() {
         if let Some(input) = inputs.iter().find(|input| same_file(input, output)) {
@@ -67,16 +68,8 @@ pub(super) fn write_pictures(
     files.iter_mut().try_for_each(|file| file.write(&layers))
 }
 
-fn refuse_input<T>(path: &Path, kind: io::ErrorKind, why: &str) -> Result<T> {
-    Err(Error::io("read", path, io::Error::new(kind, why)))
-}
-
 /// Opens a trace; warns of one without checksums.
 pub(super) fn open_trace(path: &Path, console: &Console) -> Result<Trace> {
-    if path.metadata().is_ok_and(|m| !m.is_file()) {
-        let why = "it is no regular file; name a trace";
-        return refuse_input(path, io::ErrorKind::InvalidInput, why);
-    }
     let trace = Trace::open(path)?;
     if !trace.is_sealed() {
         console.warn(&format!("{}: written without checksums by another program", trace.place()));

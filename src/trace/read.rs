@@ -1,6 +1,7 @@
 //! Reading a trace, batch by batch.
 
 use std::fs::File;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -80,10 +81,8 @@ impl Trace {
         let fail = |source| Error::io("read", &path, source);
         let metadata = std::fs::metadata(&path).map_err(fail)?;
         if !metadata.is_file() {
-            return Err(Error::config(
-                format_args!("cannot read {}: it is no regular file", path.display()),
-                "name a trace file",
-            ));
+            let why = "it is no regular file; name a trace";
+            return Err(fail(io::Error::new(io::ErrorKind::InvalidInput, why)));
         }
         let file = File::open(&path).map_err(fail)?;
         let length = usize::try_from(metadata.len()).map_err(|_| {
