@@ -163,6 +163,12 @@ macro_rules! options {
                 &[$($crate::param::Choice { name: $text, help: $help }),+];
             const ALL: &'static [Self] = &[$($name::$variant),+];
         }
+
+        impl serde::Serialize for $name {
+            fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                serializer.serialize_str(match self { $($name::$variant => $text),+ })
+            }
+        }
     };
 }
 

@@ -8,8 +8,8 @@ use crate::cli::console::Console;
 use crate::cli::files::{Json, report};
 use crate::design::{DESIGNS, Entry};
 use crate::error::Result;
-use crate::param::{Kind, Param};
-use crate::rop::{Info, Promises};
+use crate::param::{Kind, Options as _, Param};
+use crate::rop::{Family, Info, Promises};
 
 /// List the designs with their citations and parameters
 #[derive(Debug, Args)]
@@ -37,18 +37,15 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
 }
 
 fn print(documents: &[Document], console: &Console) -> Result<()> {
-    for Document { info, promises: p } in documents {
-        console.print(format_args!("{}\n  {}\n  {}", info.name, info.summary, info.citation))?;
-        let list = [
-            (p.unbiased, "unbiased"),
-            (p.consistent, "consistent"),
-            (p.order_independent, "independent of order"),
-        ];
-        let held: Vec<&str> = list.iter().filter(|(holds, _)| *holds).map(|(_, n)| *n).collect();
-        if !held.is_empty() {
-            console.print(format_args!("  {}", held.join(", ")))?;
+    for (family, about) in Family::ALL.iter().zip(Family::CHOICES) {
+        console.print(format_args!("{}: {}\n", about.name, about.help))?;
+        for Document { info, promises } in documents.iter().filter(|d| d.info.family == *family) {
+            console
+                .print(format_args!("{}\n  {}\n  {}", info.name, info.summary, info.citation))?;
+            console.print(format_args!("  {}", promises.words().join(", ")))?;
+            print_params(info.params, console)?;
         }
-        print_params(info.params, console)?;
+        console.print(format_args!(""))?;
     }
     Ok(())
 }

@@ -58,6 +58,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let mut explanation = design.explain(&trace, samples, seed, site, &watch)?;
     drop(progress);
     let all = explanation.steps.len();
+    let passes = explanation.steps.last().map_or(1, |step| step.pass + 1);
     let left_out = arguments.last.map_or(0, |last| all.saturating_sub(last));
     let before = explanation.steps.drain(..left_out).next_back().map(|step| step.contents);
     let document = Document {
@@ -86,7 +87,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         }
         let mut before = before.unwrap_or_else(|| explanation.cleared.clone());
         for (i, step) in explanation.steps.iter().enumerate() {
-            print_step(left_out + i + 1, all, step, &before, console)?;
+            print_step(left_out + i + 1, all, passes, step, &before, console)?;
             before = step.contents.clone();
         }
         let [r, g, b] = explanation.colour;
@@ -110,6 +111,7 @@ fn depth(z: Unorm32) -> String {
 fn print_step(
     number: usize,
     all: usize,
+    passes: u32,
     step: &Step,
     before: &Contents,
     console: &Console,
@@ -117,8 +119,9 @@ fn print_step(
     let line = |name: &str, value: String| console.print(format_args!("  {name:<10} {value}"));
     let f = &step.fragment;
     let [r, g, b] = f.colour;
+    let pass = if passes > 1 { format!("pass {}, ", step.pass + 1) } else { String::new() };
     console.print(format_args!(
-        "\nfragment {number} of {all}, row {}: primitive {}, object {}",
+        "\n{pass}fragment {number} of {all}, row {}: primitive {}, object {}",
         step.row, f.primitive, f.object
     ))?;
     line("fragment", format!("alpha {}, colour {r:.4} {g:.4} {b:.4}", f.alpha))?;

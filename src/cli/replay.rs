@@ -248,11 +248,5 @@ fn print_events(
     console.print(format_args!("state per pixel         {size}"))?;
     console.print(format_args!("passes over the trace   {}", replayed.passes))?;
     let promises = design.promises();
-    let word = |holds: bool| if holds { "yes" } else { "no" };
-    console.print(format_args!(
-        "promises                unbiased {}, consistent {}, independent of order {}",
-        word(promises.unbiased),
-        word(promises.consistent),
-        word(promises.order_independent)
-    ))
+    console.print(format_args!("promises                {}", promises.words().join(", ")))
 }

@@ -6,8 +6,8 @@ use crate::param::{Param, Values};
 use crate::random::hash;
 use crate::resolve::box_filter;
 use crate::rop::{
-    Blueprint, Contents, Design, Family, Frame, Info, Probe, Promises, Samples, Site, StateBits,
-    Threshold, depth_bits,
+    Blueprint, Contents, Design, Family, Frame, Info, OrderPromise, Probe, Promises, Samples, Site,
+    StateBits, Threshold, depth_bits,
 };
 use crate::trace::{Fragment, SampleMask, Unorm32};
 
@@ -41,6 +41,7 @@ impl Blueprint for Enderton {
             Param::choice::<Among>("among", "passed", "which samples are chosen from"),
             depth_bits::PARAM,
         ],
+        combinations: &[],
     };
 
     type At<const N: usize> = EndertonAt<N>;
@@ -63,7 +64,13 @@ impl Blueprint for Enderton {
         Promises {
             unbiased: apart,
             consistent: apart,
-            order_independent: apart && (naive || among_all),
+            order: if apart && (naive || among_all) {
+                OrderPromise::Independent
+            } else {
+                OrderPromise::Dependent
+            },
+            exact_opaque: true,
+            seeded: true,
         }
     }
 }

@@ -3,7 +3,8 @@
 use crate::error::Result;
 use crate::param::Values;
 use crate::rop::{
-    Blueprint, Contents, Design, Family, Frame, Info, Probe, Promises, Site, StateBits,
+    Blueprint, Contents, Design, Family, Frame, Info, OrderPromise, Probe, Promises, Site,
+    StateBits,
 };
 use crate::trace::{DepthPlane, Fragment, SampleMask};
 
@@ -17,6 +18,7 @@ impl Blueprint for Exact {
         summary: "per-sample sorted compositing in double precision: the expectation of every unbiased design",
         citation: "Enderton, Sintorn, Shirley, Luebke: Stochastic Transparency, TVCG 17(8), 2011, equation 2",
         params: &[],
+        combinations: &[],
     };
 
     type At<const N: usize> = ExactAt<N>;
@@ -26,7 +28,13 @@ impl Blueprint for Exact {
     }
 
     fn promises(_: &Values) -> Promises {
-        Promises { unbiased: true, consistent: true, order_independent: true }
+        Promises {
+            unbiased: true,
+            consistent: true,
+            order: OrderPromise::Independent,
+            exact_opaque: true,
+            seeded: false,
+        }
     }
 }
 

@@ -8,9 +8,9 @@ use crate::error::Result;
 use crate::param::{Param, Values};
 use crate::resolve::box_filter;
 use crate::rop::{
-    Blueprint, Contents, Design, Family, Frame, Info, PixelIndex, PixelOrder, Probe, Promises,
-    Reference, ReferenceKey, SampleList, Samples, Site, StateBits, SurfaceRule, SurfaceTracker,
-    Threshold, Tracked, depth_bits, in_sample_order, sort_by_stored_depth,
+    Blueprint, Contents, Design, Family, Frame, Info, OrderPromise, PixelIndex, PixelOrder, Probe,
+    Promises, Reference, ReferenceKey, SampleList, Samples, Site, StateBits, SurfaceRule,
+    SurfaceTracker, Threshold, Tracked, depth_bits, in_sample_order, sort_by_stored_depth,
 };
 use crate::trace::{Fragment, SampleMask, Unorm32};
 
@@ -52,6 +52,7 @@ impl Blueprint for LaineKarras {
             Param::choice::<Reference>("reference", "lk2011", "how reference values are made"),
             depth_bits::PARAM,
         ],
+        combinations: &[],
     };
 
     type At<const N: usize> = LaineKarrasAt<N>;
@@ -95,7 +96,9 @@ impl Blueprint for LaineKarras {
             // Unscrambled values still share out each stored surface evenly, as long as
             // its samples are numbered in a row.
             consistent: apart && (scrambled || (values.flag("compact") && values.flag("sort"))),
-            order_independent: false,
+            order: OrderPromise::Dependent,
+            exact_opaque: true,
+            seeded: true,
         }
     }
 }

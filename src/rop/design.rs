@@ -155,20 +155,54 @@ pub struct Promises {
     pub unbiased: bool,
     /// Its picture approaches the exact one as samples increase.
     pub consistent: bool,
-    /// The order in which fragments of different depths arrive changes no bit.
-    pub order_independent: bool,
+    /// What the order does in which fragments of different depths arrive.
+    pub order: OrderPromise,
+    /// However opaque fragments share pixels, their picture is the exact one. (That
+    /// of opaque fragments that cover whole pixels always is.)
+    pub exact_opaque: bool,
+    /// The picture depends on the seed.
+    pub seeded: bool,
 }
 
-/// How designs are grouped in listings.
+impl Promises {
+    /// What is promised, in words.
+    pub fn words(&self) -> Vec<&'static str> {
+        let order = match self.order {
+            OrderPromise::Independent => "independent of order",
+            OrderPromise::UpToRounding => "independent of order up to rounding",
+            OrderPromise::Dependent => "",
+        };
+        let list = [
+            (self.unbiased, "unbiased"),
+            (self.consistent, "consistent"),
+            (!order.is_empty(), order),
+            (self.exact_opaque, "exact where opaque"),
+            (!self.seeded, "the same for every seed"),
+        ];
+        list.iter().filter(|(holds, _)| *holds).map(|(_, word)| *word).collect()
+    }
+}
+
+/// What the order does in which fragments of different depths arrive.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Family {
-    /// The answer that others are measured against.
-    Reference,
-    /// Random coverage of samples and an ordinary depth test.
-    Stochastic,
-    /// Blending, merging or keeping a bounded number of layers.
-    Deterministic,
+pub enum OrderPromise {
+    /// It changes no bit.
+    Independent,
+    /// It changes in which order sums are rounded and nothing else.
+    UpToRounding,
+    /// It changes the picture.
+    Dependent,
+}
+
+crate::options! {
+    /// How designs are grouped in listings.
+    pub enum Family {
+        Reference = "reference": "the answer that others are measured against",
+        Stochastic = "stochastic": "random coverage of samples, or random choice of layers",
+        Layered = "layered": "a bounded number of layers per pixel, in the order of their depths",
+        Blended = "blended": "sums over all fragments, or blending in the order in which they come",
+    }
 }
 
 /// What a listing says about a design.
@@ -184,6 +218,9 @@ pub struct Info {
     pub citation: &'static str,
     /// Its parameters.
     pub params: &'static [Param],
+    /// Settings, as `a=1,b=2`, that the conformance suite tries beside each parameter
+    /// changed alone: where parameters work upon each other.
+    pub combinations: &'static [&'static str],
 }
 
 /// A design with its parameters still open: what the registry holds.

@@ -5,15 +5,19 @@ pub mod depth_bits;
 mod design;
 mod event;
 mod opacity;
+pub mod over_opaque;
 mod pixel_order;
 mod reference_value;
 mod replay;
 mod samples;
 mod surface;
 
-pub use design::{Blueprint, Contents, Design, Family, Frame, Info, Promises, Site, StateBits};
+pub use design::{
+    Blueprint, Contents, Design, Family, Frame, Info, OrderPromise, Promises, Site, StateBits,
+};
 pub use event::{EventCounts, NoProbe, Probe, Record, ReferenceRecord};
 pub use opacity::Threshold;
+pub use over_opaque::{Opaque, OverOpaque, Transparent};
 pub use pixel_order::{PixelIndex, PixelOrder};
 pub use reference_value::{Reference, ReferenceKey, scramble_lk2011};
 pub use replay::{Explanation, ReplayOptions, Replayed, Step, draw_pixel, explain, replay};

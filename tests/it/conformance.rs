@@ -5,7 +5,7 @@ use std::sync::Mutex;
 use screendoor::design::Configured;
 use screendoor::metrics::{Region, errors};
 use screendoor::random::Stream;
-use screendoor::rop::{ReplayOptions, Site};
+use screendoor::rop::{Family, OrderPromise, ReplayOptions, Site};
 use screendoor::trace::{Fragment, SampleMask, Trace, Unorm32, WriteOptions};
 
 use crate::util::{
@@ -87,23 +87,36 @@ fn an_empty_trace_shows_the_background() {
 
 #[test]
 fn opaque_fragments_give_the_exact_picture() {
+    let mut broken = vec![false; all_variants().len()];
     for samples in [1, 2, 4, 8, 16, 32, 64] {
         let mut header = header(40, 40, samples);
         header.background = [0.5, 0.25, 0.125];
-        let mut fragments = random_fragments(&header, 4000, samples);
-        for (i, f) in fragments.iter_mut().enumerate() {
-            f.alpha = 1.0;
-            // Sums of few bits, exact in any precision; depths that 16 bits tell apart.
-            f.colour = f.colour.map(|c| (c * 64.0).floor() / 64.0);
-            f.depth.z = Unorm32((i as u32).wrapping_mul(40503) << 16);
-            (f.depth.dzdx, f.depth.dzdy) = (0, 0);
+        // Whole pixels for all; pieces for those that promise it.
+        for whole in [true, false] {
+            let mut fragments = random_fragments(&header, 4000, samples);
+            for (i, f) in fragments.iter_mut().enumerate() {
+                f.alpha = 1.0;
+                // Sums of few bits, exact in any precision; depths that 16 bits tell apart.
+                f.colour = f.colour.map(|c| (c * 64.0).floor() / 64.0);
+                f.depth.z = Unorm32((i as u32).wrapping_mul(40503) << 16);
+                (f.depth.dzdx, f.depth.dzdy) = (0, 0);
+                if whole {
+                    f.coverage = SampleMask::first(samples);
+                }
+            }
+            let trace = trace(&header, &fragments);
+            let exact = picture(&design("exact"), &trace, samples, 0);
+            for (design, broken) in all_variants().iter().zip(&mut broken) {
+                let same = picture(design, &trace, samples, 9).hash() == exact.hash();
+                if whole || design.promises().exact_opaque {
+                    assert!(same, "{} at {samples}, whole: {whole}", design.label());
+                }
+                *broken |= !same;
+            }
         }
-        let trace = trace(&header, &fragments);
-        let exact = picture(&design("exact"), &trace, samples, 0);
-        for design in all_variants() {
-            let picture = picture(&design, &trace, samples, 9);
-            assert_eq!(picture.hash(), exact.hash(), "{} at {samples}", design.label());
-        }
+    }
+    for (design, broken) in all_variants().iter().zip(broken) {
+        assert_eq!(broken, !design.promises().exact_opaque, "{}", design.label());
     }
 }
 
@@ -114,12 +127,18 @@ fn alpha_0_leaves_nothing_and_one_fragment_is_right_on_average() {
     let single = trace(&header, &layered(&header, 1, |_| (5, [1.0; 3], 0.3)));
     for design in all_variants() {
         assert_eq!(picture(&design, &invisible, 8, 0).get(7, 7), [0.0; 3], "{}", design.label());
-        // 64 × 64 pixels × 8 samples: the mean's deviation is below 0.0026 even for
-        // independent samples; six of them.
+        let limit = match (design.promises().seeded, design.info().family) {
+            // 64 × 64 pixels × 8 samples: the mean's deviation is below 0.0026 even for
+            // independent samples; six of them.
+            (true, _) => 0.016,
+            // Half a sample.
+            (false, Family::Stochastic) => 0.5 / 8.0,
+            (false, _) => ROUNDING / 255.0,
+        };
         let exact = picture(&self::design("exact"), &single, 8, 0);
         let picture = picture(&design, &single, 8, 0);
         let mean = errors(&picture, &exact, &Region::frame(picture.grid())).mean;
-        assert!(mean.abs() < 0.016 * 255.0, "{}: {mean}", design.label());
+        assert!(mean.abs() <= limit * 255.0, "{}: {mean}", design.label());
     }
 }
 
@@ -169,6 +188,9 @@ fn distinct_depths(samples: u32) -> (screendoor::trace::Header, Vec<Fragment>) {
     (header, fragments)
 }
 
+/// Errors of this size, in 8-bit units, are those of sums in single precision.
+const ROUNDING: f64 = 1e-3;
+
 #[test]
 fn order_changes_the_picture_only_where_that_is_not_ruled_out() {
     let (header, fragments) = distinct_depths(8);
@@ -177,8 +199,13 @@ fn order_changes_the_picture_only_where_that_is_not_ruled_out() {
     let (a, b) = (trace(&header, &fragments), trace(&header, &shuffled));
     for design in all_variants() {
         let label = design.label();
-        let same = picture(&design, &a, 8, 1).hash() == picture(&design, &b, 8, 1).hash();
-        assert_eq!(same, design.promises().order_independent, "{label}");
+        let [a, b] = [&a, &b].map(|trace| picture(&design, trace, 8, 1));
+        let found = match errors(&a, &b, &Region::frame(a.grid())).max {
+            _ if a.hash() == b.hash() => OrderPromise::Independent,
+            error if error < ROUNDING => OrderPromise::UpToRounding,
+            _ => OrderPromise::Dependent,
+        };
+        assert_eq!(found, design.promises().order, "{label}");
     }
 }
 
@@ -191,7 +218,9 @@ fn more_samples_come_nearer_where_that_is_promised_and_only_there() {
     for f in &mut random {
         f.coverage = SampleMask(u64::MAX);
     }
-    let traces = [trace(&header, &coherent), trace(&header, &random)];
+    // More layers than anyone keeps.
+    let deep = layered(&header, 40, |i| (i * 3 % 40, [(i % 7) as f32 / 6.0; 3], 0.05));
+    let traces = [&coherent, &random, &deep].map(|fragments| trace(&header, fragments));
     for design in all_variants() {
         let gains = traces.each_ref().map(|trace| {
             let error = |samples| {
@@ -201,7 +230,7 @@ fn more_samples_come_nearer_where_that_is_promised_and_only_there() {
             // From 2 to 64 samples independent sampling gains √32 = 5.7.
             (error(2), error(64))
         });
-        let nearer = gains.iter().all(|(few, many)| many * 4.0 <= *few);
+        let nearer = gains.iter().all(|(few, many)| many * 4.0 <= *few || *many < ROUNDING);
         assert_eq!(nearer, design.promises().consistent, "{}: {gains:?}", design.label());
     }
 }
@@ -224,8 +253,10 @@ fn counts_add_up_and_counting_changes_nothing() {
             let passes = u64::from(counted.passes);
             assert_eq!(events.fragments, covered.len() as u64 * passes, "{label}");
             let tested = covered.iter().map(|n| u64::from(*n)).sum::<u64>() * passes;
-            // Who has no depth test must not claim any.
-            assert!([0, tested].contains(&events.samples_tested), "{label}");
+            if passes == 1 {
+                // Who has no depth test must not claim any.
+                assert!([0, tested].contains(&events.samples_tested), "{label}");
+            }
             assert!(events.samples_passed <= events.samples_tested, "{label}");
             assert!(events.samples_written <= tested, "{label}");
             assert!(events.samples_written > 0 && events.state_bits_written > 0, "{label}");
@@ -247,6 +278,7 @@ fn explaining_a_pixel_tells_how_its_colour_came_about() {
             let expected = whole.get(x.into(), y.into());
             assert_eq!(explanation.colour, expected, "{}", design.label());
             assert!(!explanation.steps.is_empty() && *calls.lock().unwrap() > 0);
+            assert!(explanation.steps.iter().any(|s| !s.record.written.is_empty()));
             for step in &explanation.steps {
                 assert_eq!((step.fragment.x, step.fragment.y), (x, y));
                 let record = &step.record;
@@ -268,8 +300,7 @@ fn seeds_name_pictures() {
     for design in all_variants() {
         let hash = |seed| picture(&design, &trace, 8, seed).hash();
         assert_eq!(hash(4), hash(4));
-        // The reference has nothing random in it.
-        assert_eq!(hash(4) == hash(5), design.info().name == "exact", "{}", design.label());
+        assert_eq!(hash(4) != hash(5), design.promises().seeded, "{}", design.label());
     }
 }
 

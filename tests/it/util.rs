@@ -1,7 +1,7 @@
 //! What several tests share.
 
 use screendoor::design::{Configured, DESIGNS, Entry};
-use screendoor::param::Kind;
+use screendoor::param::{Kind, parse_spec};
 use screendoor::picture::Picture;
 use screendoor::random::Stream;
 use screendoor::rop::ReplayOptions;
@@ -75,12 +75,13 @@ pub fn trace(header: &Header, fragments: &[Fragment]) -> Trace {
 }
 
 /// Every design of the registry with its defaults, and with each of its
-/// parameters changed alone to each of its other values.
+/// parameters changed alone to each of its other values (the ends of a range), and
+/// with the combinations that it names.
 pub fn all_variants() -> Vec<Configured> {
     DESIGNS.iter().flat_map(variants).collect()
 }
 
-/// One design with its defaults and with each parameter changed alone.
+/// The variants of one design.
 pub fn variants(entry: &Entry) -> Vec<Configured> {
     let mut settings: Vec<Vec<(String, String)>> = vec![Vec::new()];
     for param in entry.info.params {
@@ -92,6 +93,9 @@ pub fn variants(entry: &Entry) -> Vec<Configured> {
         };
         let changed = values.into_iter().filter(|v| v != param.default);
         settings.extend(changed.map(|v| vec![(param.name.to_string(), v)]));
+    }
+    for combination in entry.info.combinations {
+        settings.push(parse_spec(&format!(":{combination}")).unwrap().1);
     }
     settings.iter().map(|given| entry.configure(given).unwrap()).collect()
 }

@@ -1,0 +1,190 @@
+//! Opaque geometry first, transparent geometry over it: what every technique does
+//! that blends, sums or keeps layers.
+//!
+//! Enderton et al. 2011, section 3.5: opaque fragments go to a multisampled
+//! z-buffer of their own, transparent ones are culled behind it, and the opaque
+//! picture is dimmed sample by sample.
+
+use crate::param::{Param, Values};
+use crate::resolve::box_filter;
+use crate::rop::design::{Contents, Design, Frame, Site, StateBits};
+use crate::rop::event::Probe;
+use crate::rop::samples::Samples;
+use crate::trace::{Fragment, Unorm32};
+
+crate::options! {
+    /// How opaque fragments (alpha 1) are drawn by designs for transparent ones.
+    pub enum Opaque {
+        First = "first": "in a pass of their own into a z-buffer that culls the others",
+        Together = "together": "like all others, without a z-buffer",
+    }
+}
+
+/// The parameter's declaration.
+pub const PARAM: Param =
+    Param::choice::<Opaque>("opaque", "first", "how opaque fragments (alpha 1) are drawn");
+
+/// The parameter's value.
+pub fn of(values: &Values) -> Opaque {
+    values.choice(PARAM.name)
+}
+
+/// How a design draws transparent fragments over what lies behind them.
+///
+/// The methods are those of [`Design`] but for what is said here.
+pub trait Transparent<const N: usize>: Send + Sync {
+    /// The state of one pixel beside the opaque z-buffer.
+    type Pixel: Send;
+
+    /// How many times it reads the trace.
+    fn passes(&self) -> u32 {
+        1
+    }
+
+    /// Bits of state of one pixel: a multisample buffer of its own, and others.
+    fn state_bits(&self) -> StateBits;
+
+    /// As [`Design::clear`].
+    fn clear(&self, site: Site) -> Self::Pixel;
+
+    /// As [`Design::draw`]; the fragment's coverage is what lies before the opaque
+    /// geometry, and never empty.
+    fn draw<P: Probe>(
+        &self,
+        pass: u32,
+        site: Site,
+        pixel: &mut Self::Pixel,
+        fragment: &Fragment,
+        probe: &mut P,
+    );
+
+    /// As [`Design::end_pass`].
+    fn end_pass(&self, _pass: u32, _site: Site, _pixel: &mut Self::Pixel) {}
+
+    /// The pixel's linear colour over the opaque picture's samples `behind`.
+    fn resolve(&self, site: Site, pixel: &Self::Pixel, behind: &[[f32; 3]; N]) -> [f64; 3];
+
+    /// As [`Design::contents`].
+    fn contents(&self, pixel: &Self::Pixel) -> Contents;
+
+    /// As [`Design::bytes_per_fragment`].
+    fn bytes_per_fragment(&self) -> Option<usize> {
+        None
+    }
+}
+
+/// A design of two parts: a z-buffer for opaque fragments, and `T` over it.
+#[derive(Clone, Debug)]
+pub struct OverOpaque<T, const N: usize> {
+    frame: Frame,
+    opaque: Opaque,
+    inner: T,
+}
+
+impl<T: Transparent<N>, const N: usize> OverOpaque<T, N> {
+    /// `inner` over opaque fragments that are drawn as `opaque` says.
+    pub fn new(frame: &Frame, opaque: Opaque, inner: T) -> Self {
+        OverOpaque { frame: frame.clone(), opaque, inner }
+    }
+
+    /// Passes over the trace before those of `inner`.
+    fn own_passes(&self) -> u32 {
+        u32::from(self.opaque == Opaque::First)
+    }
+
+    fn sample_bits(&self) -> u32 {
+        32 + self.frame.colour_bits
+    }
+}
+
+/// A pixel: opaque samples once there are any, and what lies over them.
+#[derive(Clone, Debug)]
+pub struct OverOpaquePixel<X, const N: usize> {
+    opaque: Option<Box<Samples<N>>>,
+    inner: X,
+}
+
+impl<T: Transparent<N>, const N: usize> Design for OverOpaque<T, N> {
+    type Pixel = OverOpaquePixel<T::Pixel, N>;
+
+    fn passes(&self) -> u32 {
+        self.own_passes() + self.inner.passes()
+    }
+
+    fn state_bits(&self) -> StateBits {
+        let inner = self.inner.state_bits();
+        StateBits {
+            samples: inner.samples + self.own_passes() * N as u32 * self.sample_bits(),
+            ..inner
+        }
+    }
+
+    fn clear(&self, site: Site) -> Self::Pixel {
+        OverOpaquePixel { opaque: None, inner: self.inner.clear(site) }
+    }
+
+    #[inline]
+    fn draw<P: Probe>(
+        &self,
+        pass: u32,
+        site: Site,
+        pixel: &mut Self::Pixel,
+        fragment: &Fragment,
+        probe: &mut P,
+    ) {
+        if self.opaque == Opaque::Together {
+            return self.inner.draw(pass, site, &mut pixel.inner, fragment, probe);
+        }
+        let is_opaque = fragment.alpha >= 1.0;
+        if is_opaque != (pass == 0) {
+            return;
+        }
+        let z: [Unorm32; N] = self.frame.depths(fragment, 32);
+        let passed = match &pixel.opaque {
+            Some(samples) => samples.depth_test(fragment.coverage, &z),
+            None => fragment.coverage,
+        };
+        probe.depth_test(fragment.coverage, passed);
+        probe.state(32 * fragment.coverage.count(), 0);
+        if passed.is_empty() {
+            return;
+        }
+        if !is_opaque {
+            let fragment = Fragment { coverage: passed, ..*fragment };
+            return self.inner.draw(pass - 1, site, &mut pixel.inner, &fragment, probe);
+        }
+        let samples =
+            pixel.opaque.get_or_insert_with(|| Box::new(Samples::cleared(self.frame.background)));
+        for s in passed.iter() {
+            samples.write(s, z[s], fragment.colour);
+        }
+        probe.written(passed);
+        probe.state(0, self.sample_bits() * passed.count());
+    }
+
+    fn end_pass(&self, pass: u32, site: Site, pixel: &mut Self::Pixel) {
+        if let Some(pass) = pass.checked_sub(self.own_passes()) {
+            self.inner.end_pass(pass, site, &mut pixel.inner);
+        }
+    }
+
+    fn resolve(&self, site: Site, pixel: &Self::Pixel) -> [f64; 3] {
+        match &pixel.opaque {
+            Some(samples) => self.inner.resolve(site, &pixel.inner, &samples.colour),
+            None => self.inner.resolve(site, &pixel.inner, &[self.frame.background; N]),
+        }
+    }
+
+    fn contents(&self, pixel: &Self::Pixel) -> Contents {
+        let mut contents = self.inner.contents(&pixel.inner);
+        if let Some(samples) = &pixel.opaque {
+            let colour = box_filter(&samples.colour).map(|c| format!("{c:.3}")).join(" ");
+            contents.fields.insert(0, ("opaque", colour));
+        }
+        contents
+    }
+
+    fn bytes_per_fragment(&self) -> Option<usize> {
+        self.inner.bytes_per_fragment()
+    }
+}
