@@ -1,21 +1,24 @@
-//! Stochastic transparency (Enderton, Sintorn, Shirley, Luebke, TVCG 2011): the
-//! single-pass method.
+//! Stochastic transparency (Enderton, Sintorn, Shirley, Luebke, TVCG 2011).
+
+use arrayvec::ArrayVec;
 
 use crate::error::Result;
 use crate::param::{Param, Values};
 use crate::random::hash;
-use crate::resolve::box_filter;
+use crate::rop::stochastic::{self, COMBINATIONS, METHOD, OPAQUE, ROUNDS, STRATA};
 use crate::rop::{
-    Blueprint, Contents, Design, Family, Frame, Info, OrderPromise, Probe, Promises, Samples, Site,
-    StateBits, Threshold, depth_bits,
+    Blueprint, Dither, Family, Frame, Info, OrderPromise, PixelOrder, Probe, Promises, Reference,
+    ReferenceKey, Round, Sampler, Site, Stochastic, Threshold, depth_bits,
 };
-use crate::trace::{Fragment, SampleMask, Unorm32};
+use crate::tile::TileGrid;
+use crate::trace::{Fragment, MAX_SAMPLES, SampleMask, Unorm32};
 
 crate::options! {
     /// How a fragment's samples are chosen.
     pub enum MaskRule {
         Stratified = "stratified": "floor(alpha n + xi) of the fragment's n samples, at random (section 3.1)",
         Naive = "naive": "each sample on its own, with probability alpha",
+        Table = "table": "a mask from a table over alpha and a random number (section 5)",
     }
 }
 
@@ -24,6 +27,15 @@ crate::options! {
     pub enum Among {
         Passed = "passed": "those that pass the depth test (as Laine and Karras read it)",
         Covered = "covered": "all that it covers",
+    }
+}
+
+crate::options! {
+    /// What, beside the pixel, a fragment's random numbers depend on (section 6).
+    pub enum SeedBy {
+        Primitive = "primitive": "its primitive: masks change at triangles' edges",
+        Depth = "z": "its depth at the pixel's centre: still pictures only",
+        Object = "object": "its object: fragments of one object hide each other",
     }
 }
 
@@ -39,143 +51,216 @@ impl Blueprint for Enderton {
         params: &[
             Param::choice::<MaskRule>("mask", "stratified", "how a fragment's samples are chosen"),
             Param::choice::<Among>("among", "passed", "which samples are chosen from"),
+            Param::choice::<Dither>(
+                "dither",
+                "white",
+                "how xi, which rounds the number of samples, is spread over pixels (section 3.1)",
+            ),
+            Param::choice::<SeedBy>("seed-by", "primitive", "what names a fragment's mask"),
+            Param::integer("table-width", "2047", (1, 65535), "masks for each alpha in the table"),
+            Param::integer("alpha-bits", "10", (1, 16), "bits of alpha that the table tells apart"),
+            METHOD,
+            ROUNDS,
+            STRATA,
+            OPAQUE,
             depth_bits::PARAM,
         ],
-        combinations: &[],
+        combinations: &COMBINATIONS_OF_ENDERTON,
     };
 
-    type At<const N: usize> = EndertonAt<N>;
+    type At<const N: usize> = Stochastic<EndertonSampler<N>, N>;
 
-    fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<EndertonAt<N>> {
-        Ok(EndertonAt {
-            frame: frame.clone(),
+    fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
+        let sampler = EndertonSampler {
+            grid: frame.grid,
             mask: values.choice("mask"),
             among: values.choice("among"),
-            depth_bits: depth_bits::of(values),
-        })
+            dither: values.choice("dither"),
+            seed_by: values.choice("seed-by"),
+            table_width: values.integer("table-width") as u32,
+            alpha_levels: (1 << values.integer("alpha-bits")) - 1,
+        };
+        stochastic::with_methods(values, frame, sampler)
     }
 
     fn promises(values: &Values) -> Promises {
         // What a fragment chooses follows from its primitive alone, unless it
         // chooses among the samples that earlier fragments have left it.
-        let naive = values.choice::<MaskRule>("mask") == MaskRule::Naive;
-        let among_all = values.choice::<Among>("among") == Among::Covered;
+        let mask: MaskRule = values.choice("mask");
+        let of_itself = mask != MaskRule::Stratified
+            || values.choice::<Among>("among") == Among::Covered
+            || stochastic::strata_over_rounds(values);
         let apart = depth_bits::tells_apart(values);
-        Promises {
-            unbiased: apart,
-            consistent: apart,
-            order: if apart && (naive || among_all) {
-                OrderPromise::Independent
-            } else {
-                OrderPromise::Dependent
+        // One object's surfaces share their masks; a table's alphas are rounded.
+        let own_masks = values.choice::<SeedBy>("seed-by") != SeedBy::Object;
+        let basic = Promises {
+            unbiased: apart && own_masks && mask != MaskRule::Table,
+            // As far as the most samples that a pixel can have tell.
+            consistent: apart
+                && own_masks
+                && (mask != MaskRule::Table || values.integer("alpha-bits") >= 8),
+            order: match apart && of_itself {
+                true => OrderPromise::Independent,
+                false => OrderPromise::Dependent,
             },
             exact_opaque: true,
             seeded: true,
-        }
+        };
+        stochastic::promises(values, basic)
     }
 }
 
-/// The design for pixels of `N` samples.
+const COMBINATIONS_OF_ENDERTON: [&str; COMBINATIONS.len() + 4] = [
+    COMBINATIONS[0],
+    COMBINATIONS[1],
+    COMBINATIONS[2],
+    COMBINATIONS[3],
+    "mask=naive,method=alpha-correction",
+    "mask=naive,method=depth",
+    "mask=table,alpha-bits=3,table-width=64",
+    "dither=blue-noise,method=depth-correction",
+];
+
+/// The choice of samples for pixels of `N` samples.
 #[derive(Clone, Debug)]
-pub struct EndertonAt<const N: usize> {
-    frame: Frame,
+pub struct EndertonSampler<const N: usize> {
+    grid: TileGrid,
     mask: MaskRule,
     among: Among,
-    depth_bits: u32,
+    dither: Dither,
+    seed_by: SeedBy,
+    table_width: u32,
+    alpha_levels: u32,
 }
 
-impl<const N: usize> EndertonAt<N> {
-    /// Random words that belong to (seed, pixel, primitive), so that a primitive
-    /// is treated alike wherever it stands in the stream.
-    fn word(&self, site: Site, primitive: u32, place: u32) -> u32 {
-        let pixel = u32::from(site.y) << 16 | u32::from(site.x);
-        hash([self.frame.seed, pixel, primitive, place])
+/// The most samples of all rounds that are stratified together.
+const MAX_SLOTS: usize = 8 * MAX_SAMPLES as usize;
+
+/// Random words as they are drawn for one fragment.
+#[derive(Clone, Copy)]
+struct Words {
+    seed: u32,
+    pixel: u32,
+    /// What the fragment is seeded by.
+    source: u32,
+}
+
+impl Words {
+    fn word(&self, place: u32) -> u32 {
+        hash([self.seed, self.pixel, self.source, place])
+    }
+}
+
+impl<const N: usize> EndertonSampler<N> {
+    /// ξ of the fragment, and where it comes from.
+    fn xi(&self, round: Round, site: Site, words: Words) -> u32 {
+        if self.dither == Dither::White {
+            // One word further than the samples'.
+            return words.word(N as u32 * round.count);
+        }
+        let pixel = PixelOrder::Hilbert.index(site, self.grid);
+        let key = ReferenceKey { pixel, surface: words.source, seed: words.seed };
+        self.dither.value(site, &key, Reference::Lk2011)
     }
 
-    /// The samples of `from` that the fragment is allowed to write.
+    /// `⌊α·n + ξ⌋` of the `n` slots at random: those with the smallest of as many
+    /// words; those of the round, as samples.
+    fn subset(round: Round, from: SampleMask, count: u32, word: impl Fn(u32) -> u32) -> SampleMask {
+        let mut keyed: ArrayVec<(u32, u16), MAX_SLOTS> = ArrayVec::new();
+        for r in 0..round.count {
+            keyed.extend(from.iter().map(|s| {
+                let slot = r * N as u32 + s as u32;
+                (word(slot), slot as u16)
+            }));
+        }
+        keyed.sort_unstable();
+        let chosen = keyed[..count as usize].iter().map(|(_, slot)| usize::from(*slot));
+        chosen.filter(|slot| slot / N == round.index as usize).map(|slot| slot % N).collect()
+    }
+}
+
+impl<const N: usize> Sampler<N> for EndertonSampler<N> {
+    type State = ();
+
+    fn clear(&self, _site: Site) {}
+
+    fn state_bits(&self) -> u32 {
+        0
+    }
+
     fn choose<P: Probe>(
         &self,
+        round: Round,
         site: Site,
+        (): &mut (),
+        _stored: &[Unorm32; N],
+        passed: SampleMask,
         fragment: &Fragment,
-        from: SampleMask,
         probe: &mut P,
     ) -> SampleMask {
+        if passed.is_empty() {
+            return SampleMask::NONE;
+        }
+        let words = Words {
+            seed: round.seed,
+            pixel: u32::from(site.y) << 16 | u32::from(site.x),
+            // The random words belong to what the fragment is part of, so that it is
+            // treated alike wherever it stands in the stream.
+            source: match self.seed_by {
+                SeedBy::Primitive => fragment.primitive,
+                SeedBy::Depth => fragment.depth.z.0,
+                SeedBy::Object => fragment.object,
+            },
+        };
+        let from = match self.among {
+            // What other rounds leave of a fragment is not known: where masks are
+            // stratified over rounds they are chosen among all samples.
+            Among::Passed if round.count == 1 => passed,
+            _ => fragment.coverage,
+        };
         let opacity = Threshold::of(fragment.alpha);
-        let word = |place| self.word(site, fragment.primitive, place);
-        match self.mask {
+        let slots = from.count() * round.count;
+        let chosen = match self.mask {
             MaskRule::Naive => {
                 probe.hashed(from.count());
                 let passes = |s: &usize| {
-                    let x = word(*s as u32);
+                    let x = words.word(round.index * N as u32 + *s as u32);
                     probe.reference(*s as u8, *s as u32, x, opacity);
                     opacity.passes(x)
                 };
                 from.iter().filter(passes).collect()
             }
             MaskRule::Stratified => {
-                probe.hashed(1 + from.count());
-                // ξ is one word further than the samples'.
-                let count = opacity.of_many(from.count(), word(N as u32));
-                // A random subset: the samples with the smallest of as many words.
-                let mut keyed = [(0_u32, 0_u8); N];
-                let n = from.count() as usize;
-                for (slot, s) in keyed.iter_mut().zip(from.iter()) {
-                    *slot = (word(s as u32), s as u8);
-                }
-                keyed[..n].sort_unstable();
-                keyed[..count as usize].iter().map(|(_, s)| usize::from(*s)).collect()
+                probe.hashed(1 + slots);
+                let count = opacity.of_many(slots, self.xi(round, site, words));
+                Self::subset(round, from, count, |slot| words.word(slot))
             }
-        }
+            MaskRule::Table => {
+                probe.hashed(1);
+                self.look_up(round, fragment.alpha, words)
+            }
+        };
+        chosen & passed
+    }
+
+    fn fields(&self, (): &()) -> Vec<(&'static str, String)> {
+        Vec::new()
     }
 }
 
-impl<const N: usize> Design for EndertonAt<N> {
-    type Pixel = Samples<N>;
-
-    fn state_bits(&self) -> StateBits {
-        StateBits {
-            samples: N as u32 * (self.depth_bits + self.frame.colour_bits),
-            extra: 0,
-            unbounded: false,
-        }
-    }
-
-    fn clear(&self, _site: Site) -> Samples<N> {
-        Samples::cleared(self.frame.background)
-    }
-
-    fn draw<P: Probe>(
-        &self,
-        _pass: u32,
-        site: Site,
-        samples: &mut Samples<N>,
-        fragment: &Fragment,
-        probe: &mut P,
-    ) {
-        let z: [Unorm32; N] = self.frame.depths(fragment, self.depth_bits);
-        let passed = samples.depth_test(fragment.coverage, &z);
-        probe.depth_test(fragment.coverage, passed);
-        probe.state(self.depth_bits * fragment.coverage.count(), 0);
-        if passed.is_empty() {
-            return;
-        }
-        let from = match self.among {
-            Among::Passed => passed,
-            Among::Covered => fragment.coverage,
-        };
-        let written = self.choose(site, fragment, from, probe) & passed;
-        for s in written.iter() {
-            samples.write(s, z[s], fragment.colour);
-        }
-        probe.written(written);
-        probe.state(0, (self.depth_bits + self.frame.colour_bits) * written.count());
-    }
-
-    fn resolve(&self, _site: Site, samples: &Samples<N>) -> [f64; 3] {
-        box_filter(&samples.colour)
-    }
-
-    fn contents(&self, samples: &Samples<N>) -> Contents {
-        Contents { samples: samples.contents(), fields: Vec::new() }
+impl<const N: usize> EndertonSampler<N> {
+    /// A mask of the table: of the alpha's row, the column that the fragment's hash
+    /// names. The table belongs to the run's seed; its entries are computed when they
+    /// are read. The columns' ξ are even, so that each row has its alpha on average.
+    fn look_up(&self, round: Round, alpha: f32, words: Words) -> SampleMask {
+        let levels = self.alpha_levels;
+        let row = (alpha * levels as f32).round() as u32;
+        let column = ((u64::from(words.word(N as u32)) * u64::from(self.table_width)) >> 32) as u32;
+        let slots = u64::from(round.count) * N as u64;
+        let xi =
+            (2 * u64::from(column) + 1) * u64::from(levels) / (2 * u64::from(self.table_width));
+        let count = (u64::from(row) * slots + xi) / u64::from(levels);
+        let word = |slot| hash([words.seed, row, column, slot]);
+        Self::subset(round, SampleMask::first(N as u32), count as u32, word)
     }
 }

@@ -3,25 +3,30 @@
 mod enderton;
 mod exact;
 mod lk;
+mod systematic;
 
 use std::fmt;
 
 pub use enderton::Enderton;
 pub use exact::Exact;
 pub use lk::LaineKarras;
+pub use systematic::Systematic;
 
 use crate::error::{Error, Result};
 use crate::param::{Values, parse_spec};
-use crate::rop::Design as _;
 use crate::rop::{
-    Blueprint, Explanation, Frame, Info, Promises, ReplayOptions, Replayed, Site, StateBits,
-    explain, replay,
+    Blueprint, Engine, Explanation, Frame, Info, Promises, ReplayOptions, Replayed, Site,
+    StateBits, explain, replay,
 };
 use crate::trace::Trace;
 
 /// All designs.
-pub const DESIGNS: &[Entry] =
-    &[Entry::of::<Exact>(), Entry::of::<LaineKarras>(), Entry::of::<Enderton>()];
+pub static DESIGNS: &[Entry] = &[
+    Entry::of::<Exact>(),
+    Entry::of::<LaineKarras>(),
+    Entry::of::<Systematic>(),
+    Entry::of::<Enderton>(),
+];
 
 /// The name of the design that others are measured against.
 pub const REFERENCE: &str = Exact::INFO.name;
@@ -33,12 +38,8 @@ pub struct Entry {
     /// What a listing says about it.
     pub info: Info,
     promises: fn(&Values) -> Promises,
-    replay: fn(&Values, &Frame, &Trace, &ReplayOptions<'_>) -> Result<Replayed>,
-    explain: ExplainFn,
-    state_bits: fn(&Values, &Frame) -> Result<StateBits>,
+    build: fn(&Values, &Frame) -> Result<Box<dyn Engine>>,
 }
-
-type ExplainFn = fn(&Values, &Frame, &Trace, Site, &dyn Fn(u64, u64)) -> Result<Explanation>;
 
 /// Calls a function with the frame's sample count as a constant.
 macro_rules! for_samples {
@@ -62,41 +63,16 @@ macro_rules! for_samples {
 impl Entry {
     /// The entry of a design.
     pub const fn of<B: Blueprint>() -> Self {
-        fn replay_at<B: Blueprint, const N: usize>(
+        fn build_at<B: Blueprint, const N: usize>(
             values: &Values,
             frame: &Frame,
-            trace: &Trace,
-            options: &ReplayOptions<'_>,
-        ) -> Result<Replayed> {
-            replay(&B::at::<N>(values, frame)?, frame, trace, options)
-        }
-        fn explain_at<B: Blueprint, const N: usize>(
-            values: &Values,
-            frame: &Frame,
-            trace: &Trace,
-            site: Site,
-            progress: &dyn Fn(u64, u64),
-        ) -> Result<Explanation> {
-            explain(&B::at::<N>(values, frame)?, frame, trace, site, progress)
-        }
-        fn state_bits_at<B: Blueprint, const N: usize>(
-            values: &Values,
-            frame: &Frame,
-        ) -> Result<StateBits> {
-            Ok(B::at::<N>(values, frame)?.state_bits())
+        ) -> Result<Box<dyn Engine>> {
+            Ok(Box::new(B::at::<N>(values, frame)?))
         }
         Entry {
             info: B::INFO,
             promises: B::promises,
-            replay: |values, frame, trace, options| {
-                for_samples!(frame.samples(), replay_at::<B>(values, frame, trace, options))
-            },
-            explain: |values, frame, trace, site, progress| {
-                for_samples!(frame.samples(), explain_at::<B>(values, frame, trace, site, progress))
-            },
-            state_bits: |values, frame| {
-                for_samples!(frame.samples(), state_bits_at::<B>(values, frame))
-            },
+            build: |values, frame| for_samples!(frame.samples(), build_at::<B>(values, frame)),
         }
     }
 
@@ -157,7 +133,8 @@ impl Configured {
         seed: u32,
         options: &ReplayOptions<'_>,
     ) -> Result<Replayed> {
-        (self.entry.replay)(&self.values, &Frame::of(trace, samples, seed)?, trace, options)
+        let frame = Frame::of(trace, samples, seed)?;
+        replay(&*self.build(&frame)?, &frame, trace, options)
     }
 
     /// Replays one pixel and writes down what happens.
@@ -180,7 +157,7 @@ impl Configured {
                 format_args!("it is {}x{} pixels", frame.grid.width(), frame.grid.height()),
             ));
         }
-        (self.entry.explain)(&self.values, &frame, trace, site, progress)
+        explain(&*self.build(&frame)?, &frame, trace, site, progress)
     }
 
     /// State per pixel at the sample count of `frame`.
@@ -188,7 +165,12 @@ impl Configured {
     /// # Errors
     /// As [`Blueprint::at`].
     pub fn state_bits(&self, frame: &Frame) -> Result<StateBits> {
-        (self.entry.state_bits)(&self.values, frame)
+        Ok(self.build(frame)?.state_bits())
+    }
+
+    /// The design for the frame.
+    fn build(&self, frame: &Frame) -> Result<Box<dyn Engine>> {
+        (self.entry.build)(&self.values, frame)
     }
 }
 

@@ -81,7 +81,7 @@ pub struct Site {
 /// frame's samples.
 pub trait Design: Send + Sync {
     /// The state of one pixel: what this design needs and nothing else.
-    type Pixel: Send;
+    type Pixel: Send + 'static;
 
     /// How many times the design reads the trace.
     fn passes(&self) -> u32 {
@@ -157,8 +157,8 @@ pub struct Promises {
     pub consistent: bool,
     /// What the order does in which fragments of different depths arrive.
     pub order: OrderPromise,
-    /// However opaque fragments share pixels, their picture is the exact one. (That
-    /// of opaque fragments that cover whole pixels always is.)
+    /// However opaque fragments share pixels and depths, their picture is the exact one.
+    /// (That of opaque fragments at different depths that cover whole pixels always is.)
     pub exact_opaque: bool,
     /// The picture depends on the seed.
     pub seeded: bool,

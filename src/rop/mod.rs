@@ -3,6 +3,7 @@
 
 pub mod depth_bits;
 mod design;
+mod dither;
 mod event;
 mod opacity;
 pub mod over_opaque;
@@ -10,16 +11,23 @@ mod pixel_order;
 mod reference_value;
 mod replay;
 mod samples;
+pub mod stochastic;
 mod surface;
+pub mod tracked;
 
 pub use design::{
     Blueprint, Contents, Design, Family, Frame, Info, OrderPromise, Promises, Site, StateBits,
 };
+pub use dither::{BAYER, BLUE_NOISE, Dither, Ranks, TILE};
 pub use event::{EventCounts, NoProbe, Probe, Record, ReferenceRecord};
 pub use opacity::Threshold;
 pub use over_opaque::{Opaque, OverOpaque, Transparent};
 pub use pixel_order::{PixelIndex, PixelOrder};
-pub use reference_value::{Reference, ReferenceKey, scramble_lk2011};
-pub use replay::{Explanation, ReplayOptions, Replayed, Step, draw_pixel, explain, replay};
+pub use reference_value::{Reference, ReferenceKey, prehash, scramble_lk2011};
+pub use replay::{
+    Engine, Explanation, ReplayOptions, Replayed, Step, TileState, Told, draw_pixel, explain,
+    replay,
+};
 pub use samples::{SampleContents, SampleList, Samples, in_sample_order, sort_by_stored_depth};
+pub use stochastic::{Round, Sampler, Stochastic};
 pub use surface::{CoveredMask, SurfaceRule, SurfaceTracker, Tracked};

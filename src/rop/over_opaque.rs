@@ -34,7 +34,7 @@ pub fn of(values: &Values) -> Opaque {
 /// The methods are those of [`Design`] but for what is said here.
 pub trait Transparent<const N: usize>: Send + Sync {
     /// The state of one pixel beside the opaque z-buffer.
-    type Pixel: Send;
+    type Pixel: Send + 'static;
 
     /// How many times it reads the trace.
     fn passes(&self) -> u32 {

@@ -1,5 +1,8 @@
 //! Numbering the pixels of a frame.
 
+use crate::rop::design::Site;
+use crate::tile::TileGrid;
+
 crate::options! {
     /// The curve along which pixels are numbered.
     pub enum PixelOrder {
@@ -15,10 +18,10 @@ crate::options! {
 pub struct PixelIndex(pub u32);
 
 impl PixelOrder {
-    /// The number of pixel (`x`, `y`) of a frame of `width` × `height` pixels.
-    pub fn index(self, x: u16, y: u16, width: u32, height: u32) -> PixelIndex {
-        let bits = width.max(height).next_power_of_two().trailing_zeros();
-        let (x, y) = (u32::from(x), u32::from(y));
+    /// The number of a pixel of a frame.
+    pub fn index(self, site: Site, frame: TileGrid) -> PixelIndex {
+        let bits = frame.width().max(frame.height()).next_power_of_two().trailing_zeros();
+        let (x, y) = (u32::from(site.x), u32::from(site.y));
         PixelIndex(match self {
             PixelOrder::Hilbert => hilbert(x, y, bits),
             PixelOrder::Morton => spread(x) | spread(y) << 1,
@@ -59,6 +62,10 @@ fn spread(v: u32) -> u32 {
 mod tests {
     use super::*;
 
+    fn site(x: u32, y: u32) -> Site {
+        Site { x: x as u16, y: y as u16 }
+    }
+
     const ORDERS: [PixelOrder; 3] = [PixelOrder::Hilbert, PixelOrder::Morton, PixelOrder::Scanline];
 
     #[test]
@@ -68,7 +75,7 @@ mod tests {
                 let mut seen = vec![false; (side * side) as usize];
                 for y in 0..side {
                     for x in 0..side {
-                        let PixelIndex(i) = order.index(x as u16, y as u16, side, side);
+                        let PixelIndex(i) = order.index(site(x, y), TileGrid::new(side, side));
                         assert!(!std::mem::replace(&mut seen[i as usize], true));
                     }
                 }
@@ -96,7 +103,8 @@ mod tests {
     #[test]
     fn the_largest_frame_fits() {
         for order in ORDERS {
-            let corner = |x, y| order.index(x, y, 1 << 16, 1 << 16).0;
+            let frame = TileGrid::new(1 << 16, 1 << 16);
+            let corner = |x, y| order.index(site(x, y), frame).0;
             let mut corners =
                 [(0, 0), (0, 65535), (65535, 0), (65535, 65535)].map(|(x, y)| corner(x, y));
             corners.sort_unstable();
@@ -107,6 +115,9 @@ mod tests {
 
     #[test]
     fn morton_interleaves() {
-        assert_eq!(PixelOrder::Morton.index(0b101, 0b011, 8, 8), PixelIndex(0b01_10_11));
+        assert_eq!(
+            PixelOrder::Morton.index(site(0b101, 0b011), TileGrid::new(8, 8)),
+            PixelIndex(0b01_10_11)
+        );
     }
 }

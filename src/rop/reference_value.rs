@@ -1,12 +1,16 @@
-//! Opacity reference values (Laine and Karras 2011, section 3).
+//! Opacity reference values (Laine and Karras 2011, section 3): nested uniform
+//! scrambles of the radical inverse, from one hash to the next better mixed.
 
-use crate::random::{hash, scatter};
+use crate::random::{hash, mix, scatter};
 use crate::rop::pixel_order::PixelIndex;
 
 crate::options! {
     /// How reference values are made.
     pub enum Reference {
-        Lk2011 = "lk2011": "four multiply-XOR rounds (LK figure 4)",
+        Lk2011 = "lk2011": "four multiply-XOR rounds (LK figure 4; Burley, JCGT 9(4), 2020)",
+        VegdahlV2 = "vegdahl-v2": "fewer multiplications, constants found by search (psychopath.io, January 2021)",
+        Vegdahl = "vegdahl": "the seed multiplied in (psychopath.io; sobol_burley, pbrt-v4's FastOwenScrambler)",
+        Owen = "owen": "one random flip for each node of the binary tree (Owen 1995)",
         RadicalInverse = "radical-inverse": "no scrambling: surfaces stay correlated (LK section 3)",
         Sobol = "sobol": "each bit flipped by an AND-parity of those below (LK figure 3b)",
         White = "white": "independent random numbers: no stratification",
@@ -32,27 +36,57 @@ impl Reference {
         if self == Reference::White {
             return hash([key.seed, key.pixel.0, key.surface, n]);
         }
-        let x = jump(n, samples, key);
+        let (x, s) = place(n, samples, key);
+        self.scramble(x, s)
+    }
+
+    /// The reversed index `x` scrambled by the seed `s`.
+    pub fn scramble(self, x: u32, s: u32) -> u32 {
         match self {
-            Reference::Lk2011 => scramble_lk2011(x),
-            Reference::Sobol => scramble_sobol(x),
-            Reference::RadicalInverse | Reference::White => x,
+            Reference::Lk2011 => scramble_lk2011(x.wrapping_add(s)),
+            Reference::VegdahlV2 => scramble_vegdahl_v2(x, s),
+            Reference::Vegdahl => scramble_vegdahl(x, s),
+            Reference::Owen => scramble_owen(x, s),
+            Reference::Sobol => scramble_sobol(x.wrapping_add(s)),
+            Reference::RadicalInverse => x.wrapping_add(s),
+            Reference::White => hash([s, x]),
         }
+    }
+
+    /// Whether two surfaces of a pixel get unrelated values.
+    pub fn scrambles(self) -> bool {
+        !matches!(self, Reference::RadicalInverse | Reference::Sobol)
     }
 }
 
-/// LK figure 4, lines 1 and 2: the reversed bits of the place in the sequence,
-/// moved on by the surface.
+impl ReferenceKey {
+    /// The key whose surface and seed have passed through a hash first: neighbouring
+    /// seeds are then as far apart as any.
+    pub fn prehashed(self) -> Self {
+        let s = self.surface.wrapping_add(scatter(self.seed));
+        ReferenceKey { surface: prehash(s), seed: 0, ..self }
+    }
+}
+
+/// A hash for seeds (sobol_burley): with Wellons' multipliers, and a constant that
+/// keeps 0 from being mapped to itself.
+#[inline]
+pub const fn prehash(n: u32) -> u32 {
+    mix(n ^ 0xe6fe_3beb)
+}
+
+/// LK figure 4, lines 1 and 2: the reversed bits of the place in the sequence, and
+/// the seed by which figure 4 moves it on: the surface.
 ///
 /// The publication's 32-bit index wraps on frames of more than 2^32 samples. Here
 /// it is 64 bits wide; what lies above 32 bits, like the seed, moves the sequence
 /// to an unrelated place, and 0 leaves it where figure 4 has it.
 #[inline]
-fn jump(n: u32, samples: u32, key: &ReferenceKey) -> u32 {
+fn place(n: u32, samples: u32, key: &ReferenceKey) -> (u32, u32) {
     let index = u64::from(n) + u64::from(key.pixel.0) * u64::from(samples);
     let moved =
         key.surface.wrapping_add(scatter(key.seed)).wrapping_add(scatter((index >> 32) as u32));
-    (index as u32).reverse_bits().wrapping_add(moved)
+    ((index as u32).reverse_bits(), moved)
 }
 
 /// LK figure 4, lines 3 to 6.
@@ -62,6 +96,35 @@ pub const fn scramble_lk2011(mut x: u32) -> u32 {
     x ^= x.wrapping_mul(0xb82f_1e52);
     x ^= x.wrapping_mul(0xc7af_e638);
     x ^ x.wrapping_mul(0x8d22_f6e6)
+}
+
+/// Vegdahl's second version.
+#[inline]
+const fn scramble_vegdahl_v2(mut x: u32, s: u32) -> u32 {
+    x = x.wrapping_add(s);
+    x ^= 0xdc96_7795;
+    x = x.wrapping_mul(0x97b7_54b7);
+    x ^= 0x8663_50b1;
+    x.wrapping_mul(0x9e37_79cd)
+}
+
+/// Vegdahl's last version, as libraries have it.
+#[inline]
+const fn scramble_vegdahl(mut x: u32, s: u32) -> u32 {
+    x ^= x.wrapping_mul(0x3d20_adea);
+    x = x.wrapping_add(s);
+    x = x.wrapping_mul((s >> 16) | 1);
+    x ^= x.wrapping_mul(0x0552_6c56);
+    x ^ x.wrapping_mul(0x53a2_2864)
+}
+
+/// Owen's scrambling itself: bit `b` is flipped by a coin that belongs to the bits
+/// below, the nodes of the tree above `b` (the index is reversed).
+fn scramble_owen(x: u32, s: u32) -> u32 {
+    (0..32).fold(x, |scrambled, b| {
+        let below = x & ((1 << b) - 1);
+        scrambled ^ (hash([s, b, below]) & 1) << b
+    })
 }
 
 /// The second dimension of the Sobol' sequence as a scrambling of the first: bit
@@ -146,7 +209,8 @@ mod tests {
     fn neighbouring_pixels_share_the_strata() {
         // Spatial stratification: the 4 aligned pixels of a block of 8 samples each
         // have all 32 strata once.
-        for reference in [Reference::Lk2011, Reference::Sobol] {
+        let stratified = Reference::ALL.iter().filter(|r| **r != Reference::White);
+        for reference in stratified {
             let mut strata: Vec<u32> =
                 (0..32).map(|i| reference.value(i % 8, 8, &key(40 + i / 8, 3, 7)) >> 27).collect();
             strata.sort_unstable();

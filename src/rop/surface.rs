@@ -82,6 +82,13 @@ impl SurfaceTracker {
         self.covered.iter_ones().collect()
     }
 
+    /// Number and samples of the current surface, for `explain`.
+    pub fn fields(&self) -> Vec<(&'static str, String)> {
+        let held: Vec<String> = self.held().iter().map(|s| s.to_string()).collect();
+        let held = if held.is_empty() { "none".to_string() } else { held.join(" ") };
+        vec![("surface", self.surface_id.to_string()), ("covered", held)]
+    }
+
     /// Bits of state per pixel of `samples` samples that a rule takes.
     pub fn state_bits(rule: SurfaceRule, tracked: Tracked, samples: u32) -> u32 {
         let (mask, source) = match rule {

@@ -91,7 +91,7 @@ fn opaque_fragments_give_the_exact_picture() {
     for samples in [1, 2, 4, 8, 16, 32, 64] {
         let mut header = header(40, 40, samples);
         header.background = [0.5, 0.25, 0.125];
-        // Whole pixels for all; pieces for those that promise it.
+        // Whole pixels for all; pieces, many at equal depths, for those that promise it.
         for whole in [true, false] {
             let mut fragments = random_fragments(&header, 4000, samples);
             for (i, f) in fragments.iter_mut().enumerate() {
@@ -102,6 +102,8 @@ fn opaque_fragments_give_the_exact_picture() {
                 (f.depth.dzdx, f.depth.dzdy) = (0, 0);
                 if whole {
                     f.coverage = SampleMask::first(samples);
+                } else if i % 2 == 0 {
+                    f.depth.z = Unorm32(1 << 31);
                 }
             }
             let trace = trace(&header, &fragments);
@@ -128,9 +130,9 @@ fn alpha_0_leaves_nothing_and_one_fragment_is_right_on_average() {
     for design in all_variants() {
         assert_eq!(picture(&design, &invisible, 8, 0).get(7, 7), [0.0; 3], "{}", design.label());
         let limit = match (design.promises().seeded, design.info().family) {
-            // 64 × 64 pixels × 8 samples: the mean's deviation is below 0.0026 even for
-            // independent samples; six of them.
-            (true, _) => 0.016,
+            // 64 × 64 pixels: the mean's deviation is below 0.0072 even where a pixel's
+            // samples are decided together; six of them.
+            (true, _) => 0.043,
             // Half a sample.
             (false, Family::Stochastic) => 0.5 / 8.0,
             (false, _) => ROUNDING / 255.0,
@@ -144,11 +146,12 @@ fn alpha_0_leaves_nothing_and_one_fragment_is_right_on_average() {
 
 #[test]
 fn of_64_equal_depths_the_last_opaque_one_lies_in_front() {
+    // Where opaque fragments are promised to be drawn as they are.
     let header = header(8, 8, 16);
     let fragments = layered(&header, 64, |i| (77, [i as f32 / 64.0; 3], 1.0));
     let trace = trace(&header, &fragments);
-    for design in all_variants() {
-        let picture = picture(&design, &trace, 16, 0);
+    for design in all_variants().iter().filter(|d| d.promises().exact_opaque) {
+        let picture = picture(design, &trace, 16, 0);
         assert_eq!(picture.get(3, 3), [63.0 / 64.0; 3], "{}", design.label());
     }
 }
@@ -169,9 +172,12 @@ fn thousands_of_layers_in_one_pixel() {
     let trace = trace(&header, &fragments);
     let exact = picture(&design("exact"), &trace, 8, 0);
     for design in all_variants().iter().filter(|d| d.promises().unbiased) {
-        // The mean of 16 pixels of 8 samples: a spread of 0.29/√128 a seed; 6σ.
-        let picture = picture(design, &trace, 8, 0);
-        let mean = errors(&picture, &exact, &Region::frame(picture.grid())).mean / 255.0;
+        // The mean of 16 pixels and 8 seeds: a spread of 0.29/√128 even where a pixel's
+        // samples are decided together; 6σ.
+        let mean = (0..8)
+            .map(|seed| picture(design, &trace, 8, seed))
+            .map(|p| errors(&p, &exact, &Region::frame(p.grid())).mean / 255.0 / 8.0)
+            .sum::<f64>();
         assert!(mean.abs() < 0.155, "{}: {mean}", design.label());
     }
 }
@@ -218,8 +224,9 @@ fn more_samples_come_nearer_where_that_is_promised_and_only_there() {
     for f in &mut random {
         f.coverage = SampleMask(u64::MAX);
     }
-    // More layers than anyone keeps.
-    let deep = layered(&header, 40, |i| (i * 3 % 40, [(i % 7) as f32 / 6.0; 3], 0.05));
+    // More layers than anyone keeps, of one object.
+    let mut deep = layered(&header, 40, |i| (i * 3 % 40, [(i % 7) as f32 / 6.0; 3], 0.05));
+    deep.iter_mut().for_each(|f| f.object = 0);
     let traces = [&coherent, &random, &deep].map(|fragments| trace(&header, fragments));
     for design in all_variants() {
         let gains = traces.each_ref().map(|trace| {

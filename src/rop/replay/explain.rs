@@ -2,7 +2,9 @@
 
 use crate::error::Result;
 use crate::rop::design::{Contents, Design, Frame, Site};
-use crate::rop::event::{NoProbe, Probe, Record};
+use crate::rop::event::{NoProbe, Record};
+use crate::rop::replay::engine::{Engine, Told};
+use crate::tile::TileGrid;
 use crate::trace::{Fragment, SampleMask, Trace};
 
 /// One fragment's way through a design.
@@ -35,8 +37,8 @@ pub struct Explanation {
 ///
 /// # Errors
 /// As [`Trace::batch`].
-pub fn explain<D: Design>(
-    design: &D,
+pub fn explain(
+    design: &dyn Engine,
     frame: &Frame,
     trace: &Trace,
     site: Site,
@@ -57,20 +59,22 @@ pub fn explain<D: Design>(
         row += batch.len() as u64;
         progress(row, trace.rows());
     }
-    let mut pixel = design.clear(site);
-    let cleared = design.contents(&pixel);
+    let (tile, within) = (frame.grid.tile(site.x, site.y), TileGrid::within(site.x, site.y));
+    let mut state = design.clear(frame.grid, tile);
+    let cleared = design.contents(&state, within);
     let mut steps = Vec::new();
     for pass in 0..design.passes() {
         for (row, fragment) in &fragments {
             let mut record = Record::default();
-            record.fragment(fragment.coverage);
-            design.draw(pass, site, &mut pixel, fragment, &mut record);
-            let contents = design.contents(&pixel);
+            let one = std::slice::from_ref(fragment);
+            design.draw(pass, &mut state, one, Told::Record(&mut record));
+            let contents = design.contents(&state, within);
             steps.push(Step { pass, row: *row, fragment: *fragment, record, contents });
         }
-        design.end_pass(pass, site, &mut pixel);
+        design.end_pass(pass, frame.grid, tile, &mut state);
     }
-    Ok(Explanation { cleared, steps, colour: design.resolve(site, &pixel) })
+    let colour = design.resolve(frame.grid, tile, &state)[within];
+    Ok(Explanation { cleared, steps, colour })
 }
 
 /// Draws fragments into one pixel, for tests of designs.

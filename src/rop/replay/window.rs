@@ -1,13 +1,14 @@
 //! Windows of fragments: read, binned by tile, drawn.
 
+use arrayvec::ArrayVec;
 use rayon::prelude::*;
 
 use crate::error::Result;
-use crate::rop::design::{Design, Frame, Site};
-use crate::rop::event::Probe;
+use crate::rop::design::Frame;
+use crate::rop::event::EventCounts;
+use crate::rop::replay::engine::{Engine, TileState, Told};
 use crate::rop::replay::group::Group;
-use crate::rop::replay::{Tally, sites};
-use crate::tile::{TileGrid, TileId, TileMap};
+use crate::tile::{TileId, TileMap};
 use crate::trace::{Batch, Fragment, SampleMask, Trace};
 
 /// Cuts a trace into windows of fragments.
@@ -131,20 +132,24 @@ fn for_each_row(parts: &[Part], frame: &Frame, group: &Group, mut each: impl FnM
     }
 }
 
+/// Fragments that are decoded at a time: few enough for the nearest cache.
+const CHUNK: usize = 64;
+
 impl Window {
-    /// Draws the window's fragments into the tiles' states, tiles in parallel.
-    pub fn draw<D: Design, T: Tally>(
+    /// Draws the window's fragments into the tiles' states, tiles in parallel; counts
+    /// events where it is asked to.
+    pub fn draw(
         &self,
-        design: &D,
+        design: &dyn Engine,
         frame: &Frame,
         pass: u32,
-        states: &mut TileMap<Vec<D::Pixel>>,
-    ) -> T {
+        states: &mut TileMap<TileState>,
+        count: bool,
+    ) -> EventCounts {
         let mut work: Vec<(usize, TileId, &[u32])> = Vec::with_capacity(self.tiles.len());
         let mut start = 0;
         for (tile, end) in &self.tiles {
-            let fresh = || sites(frame.grid, *tile).map(|site| design.clear(site)).collect();
-            let slot = states.touch(*tile, fresh);
+            let slot = states.touch(*tile, || design.clear(frame.grid, *tile));
             work.push((slot, *tile, &self.rows_by_tile[start..*end as usize]));
             start = *end as usize;
         }
@@ -156,49 +161,49 @@ impl Window {
             tiles.push((&mut tile.1, rows));
             (rest, skipped) = (later, slot + 1);
         }
-        tiles
-            .into_par_iter()
-            .map(|(pixels, rows)| {
-                let mut tally = T::default();
-                self.draw_tile(design, frame, pass, pixels, rows, &mut tally);
-                tally
-            })
-            .reduce(T::default, T::add)
-    }
-
-    fn draw_tile<D: Design, T: Tally>(
-        &self,
-        design: &D,
-        frame: &Frame,
-        pass: u32,
-        pixels: &mut [D::Pixel],
-        rows: &[u32],
-        tally: &mut T,
-    ) {
         let mask = SampleMask::first(frame.samples());
-        let mut parts = self.parts.iter();
-        let mut part = parts.next().expect("a window has parts");
-        for row in rows {
-            let row = *row as usize;
-            while row >= part.end {
-                part = parts.next().expect("rows lie in the parts");
+        let draw_tile = |(state, rows): (&mut TileState, &[u32])| {
+            let mut counts = count.then(EventCounts::default);
+            let mut decoder = Decoder { window: self, part: 0, mask };
+            let mut fragments = ArrayVec::<Fragment, CHUNK>::new();
+            for rows in rows.chunks(CHUNK) {
+                fragments.clear();
+                decoder.decode(rows, &mut fragments);
+                let told = counts.as_mut().map_or(Told::Nobody, Told::Counts);
+                design.draw(pass, state, &fragments, told);
             }
-            let mut fragment = part.batch.fragment(row - part.start + part.first);
-            fragment.coverage = fragment.coverage & mask;
-            draw_one(design, pass, pixels, &fragment, tally);
+            counts.unwrap_or_default()
+        };
+        if count {
+            let merge = |a: EventCounts, b: EventCounts| a.merged(&b);
+            return tiles.into_par_iter().map(draw_tile).reduce(EventCounts::default, merge);
         }
+        tiles.into_par_iter().for_each(|tile| {
+            draw_tile(tile);
+        });
+        EventCounts::default()
     }
 }
 
-fn draw_one<D: Design, P: Probe>(
-    design: &D,
-    pass: u32,
-    pixels: &mut [D::Pixel],
-    fragment: &Fragment,
-    probe: &mut P,
-) {
-    let site = Site { x: fragment.x, y: fragment.y };
-    let pixel = &mut pixels[TileGrid::within(site.x, site.y)];
-    probe.fragment(fragment.coverage);
-    design.draw(pass, site, pixel, fragment, probe);
+/// Reads a window's rows in rising order.
+struct Decoder<'a> {
+    window: &'a Window,
+    /// The part that held the last row.
+    part: usize,
+    mask: SampleMask,
+}
+
+impl Decoder<'_> {
+    fn decode(&mut self, rows: &[u32], fragments: &mut ArrayVec<Fragment, CHUNK>) {
+        for row in rows {
+            let row = *row as usize;
+            while row >= self.window.parts[self.part].end {
+                self.part += 1;
+            }
+            let part = &self.window.parts[self.part];
+            let mut fragment = part.batch.fragment(row - part.start + part.first);
+            fragment.coverage = fragment.coverage & self.mask;
+            fragments.push(fragment);
+        }
+    }
 }

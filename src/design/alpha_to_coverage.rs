@@ -1,0 +1,77 @@
+//! Alpha to coverage with a fixed mask for each alpha, as multisample hardware has it:
+//! the known wrong answer. Layers of one alpha cover the same samples and hide each
+//! other instead of blending (Enderton et al. 2011, section 2).
+
+use crate::error::Result;
+use crate::param::Values;
+use crate::rop::stochastic::{self, Round, Sampler, Stochastic};
+use crate::rop::{
+    Blueprint, Family, Frame, Info, OrderPromise, Probe, Promises, Site, Threshold, depth_bits,
+};
+use crate::trace::{Fragment, SampleMask, Unorm32};
+
+/// The design's entry in the registry.
+pub struct AlphaToCoverage;
+
+impl Blueprint for AlphaToCoverage {
+    const INFO: Info = Info {
+        name: "alpha-to-coverage",
+        family: Family::Stochastic,
+        summary: "the same samples for the same alpha: layers hide each other (the known wrong answer)",
+        citation: "OpenGL 4.6 specification, section 17.3.1 (GL_SAMPLE_ALPHA_TO_COVERAGE)",
+        params: &[depth_bits::PARAM],
+        combinations: &[],
+    };
+
+    type At<const N: usize> = Stochastic<FixedMask, N>;
+
+    fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
+        Ok(stochastic::single_pass(values, frame, FixedMask))
+    }
+
+    fn promises(values: &Values) -> Promises {
+        Promises {
+            unbiased: false,
+            consistent: false,
+            order: match depth_bits::tells_apart(values) {
+                true => OrderPromise::Independent,
+                false => OrderPromise::Dependent,
+            },
+            exact_opaque: true,
+            seeded: false,
+        }
+    }
+}
+
+/// The first `⌊αN + ½⌋` samples: what hardware adds in a fixed order as alpha grows.
+/// A trace's sample patterns are nested, so that any first ones are well spread.
+#[derive(Clone, Copy, Debug)]
+pub struct FixedMask;
+
+impl<const N: usize> Sampler<N> for FixedMask {
+    type State = ();
+
+    fn clear(&self, _site: Site) {}
+
+    fn state_bits(&self) -> u32 {
+        0
+    }
+
+    fn choose<P: Probe>(
+        &self,
+        _round: Round,
+        _site: Site,
+        (): &mut (),
+        _stored: &[Unorm32; N],
+        passed: SampleMask,
+        fragment: &Fragment,
+        _probe: &mut P,
+    ) -> SampleMask {
+        const HALF: u32 = 1 << 31;
+        passed & SampleMask::first(Threshold::of(fragment.alpha).of_many(N as u32, HALF))
+    }
+
+    fn fields(&self, (): &()) -> Vec<(&'static str, String)> {
+        Vec::new()
+    }
+}

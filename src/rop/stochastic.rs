@@ -1,0 +1,447 @@
+//! Stochastic transparency with any choice of samples: the single pass, and the
+//! methods of several passes of Enderton, Sintorn, Shirley and Luebke (TVCG 2011).
+//!
+//! A design says which samples a fragment may write ([`Sampler`]); what becomes of
+//! them is the same for all ([`Method`]). With the methods of several passes,
+//! opaque fragments are drawn first and apart, and what lies behind is dimmed
+//! sample by sample (section 3.5).
+
+use crate::error::Result;
+use crate::param::{Param, Values};
+use crate::random::hash;
+use crate::resolve::box_filter;
+use crate::rop::depth_bits;
+use crate::rop::design::{Contents, Frame, OrderPromise, Promises, Site, StateBits};
+use crate::rop::event::Probe;
+use crate::rop::over_opaque::{self, Opaque, OverOpaque, Transparent};
+use crate::rop::samples::Samples;
+use crate::trace::{Fragment, SampleMask, Unorm32};
+
+crate::options! {
+    /// What is made of the chosen samples. E: Enderton et al. 2011.
+    pub enum Method {
+        Basic = "basic": "one pass, the mean of the samples (E section 3.1)",
+        AlphaCorrection = "alpha-correction": "scaled to the total alpha, for one more pass (E 3.3)",
+        Depth = "depth": "all fragments weighed by a stochastic visibility: two passes (E 3.4)",
+        DepthCorrection = "depth-correction": "the same, scaled to the total alpha: three passes (E 3.4)",
+    }
+}
+
+crate::options! {
+    /// How often the samples are drawn.
+    pub enum Rounds {
+        One = "1": "once",
+        Two = "2": "twice the samples for twice the passes",
+        Four = "4": "four times",
+        Eight = "8": "eight times",
+    }
+}
+
+crate::options! {
+    /// Over what masks are stratified where samples are drawn several times.
+    pub enum Strata {
+        Round = "round": "within each round: other seeds",
+        All = "all": "over all rounds together (E section 4, footnote)",
+    }
+}
+
+/// The parameters that all samplers with several methods share.
+pub const METHOD: Param =
+    Param::choice::<Method>("method", "basic", "what is made of the chosen samples");
+/// As [`METHOD`].
+pub const ROUNDS: Param =
+    Param::choice::<Rounds>("rounds", "1", "how often the samples are drawn (E section 3.5)");
+/// As [`METHOD`].
+pub const STRATA: Param =
+    Param::choice::<Strata>("strata", "round", "over what several rounds are stratified");
+/// As [`METHOD`].
+pub const OPAQUE: Param = Param::choice::<Opaque>(
+    over_opaque::PARAM.name,
+    "first",
+    "how opaque fragments are drawn; method basic draws them like all others",
+);
+/// What the suite should try of them together.
+pub const COMBINATIONS: [&str; 4] = [
+    "method=alpha-correction,rounds=2,opaque=together",
+    "method=depth,rounds=4,strata=all",
+    "method=depth-correction,rounds=2,opaque=together",
+    "rounds=2,strata=all",
+];
+
+/// One drawing of the samples among several.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Round {
+    /// Its number among those that are stratified together.
+    pub index: u32,
+    /// How many are stratified together.
+    pub count: u32,
+    /// The seed of its random numbers.
+    pub seed: u32,
+}
+
+/// How a design chooses the samples that a fragment writes.
+pub trait Sampler<const N: usize>: Send + Sync {
+    /// What it keeps of a pixel beside the multisample buffer.
+    type State: Send + 'static;
+
+    /// A pixel's state before the first fragment of a round.
+    fn clear(&self, site: Site) -> Self::State;
+
+    /// Bits of that state.
+    fn state_bits(&self) -> u32;
+
+    /// The samples of `passed` that the fragment writes, where `passed` are those of
+    /// its samples that are not behind the `stored` depths. Tells `probe` of its
+    /// state's bits, surfaces, sorts, hashes and reference values.
+    #[expect(clippy::too_many_arguments, reason = "everything that a choice may depend on")]
+    fn choose<P: Probe>(
+        &self,
+        round: Round,
+        site: Site,
+        state: &mut Self::State,
+        stored: &[Unorm32; N],
+        passed: SampleMask,
+        fragment: &Fragment,
+        probe: &mut P,
+    ) -> SampleMask;
+
+    /// Names and values of the state, for `explain`.
+    fn fields(&self, state: &Self::State) -> Vec<(&'static str, String)>;
+}
+
+/// A stochastic design: a sampler and what is made of its choice.
+pub type Stochastic<S, const N: usize> = OverOpaque<Methods<S, N>, N>;
+
+/// The design of `sampler` with the shared parameters in `values`.
+///
+/// # Errors
+/// None today; designs pass it on from their own [`crate::rop::Blueprint::at`].
+pub fn with_methods<S: Sampler<N>, const N: usize>(
+    values: &Values,
+    frame: &Frame,
+    sampler: S,
+) -> Result<Stochastic<S, N>> {
+    let method = values.choice(METHOD.name);
+    let rounds = 1 << values.choice::<Rounds>(ROUNDS.name) as u32;
+    let strata = values.choice(STRATA.name);
+    let opaque = match method {
+        Method::Basic => Opaque::Together,
+        _ => over_opaque::of(values),
+    };
+    let depth_bits = depth_bits::of(values);
+    let methods = Methods { frame: frame.clone(), sampler, depth_bits, method, rounds, strata };
+    Ok(OverOpaque::new(frame, opaque, methods))
+}
+
+/// The design of `sampler` in a single pass, without the shared parameters but for
+/// the width of the depth buffer.
+pub fn single_pass<S: Sampler<N>, const N: usize>(
+    values: &Values,
+    frame: &Frame,
+    sampler: S,
+) -> Stochastic<S, N> {
+    let methods = Methods {
+        frame: frame.clone(),
+        sampler,
+        depth_bits: depth_bits::of(values),
+        method: Method::Basic,
+        rounds: 1,
+        strata: Strata::Round,
+    };
+    OverOpaque::new(frame, Opaque::Together, methods)
+}
+
+/// What a design promises with the shared parameters, of which the single pass
+/// promises `basic` with [`Strata::Round`].
+///
+/// Correction divides by what chance has found: biased (E sections 4.1 and 4.2).
+/// It is consistent for given alphas: what E calls inconsistent is an alpha that
+/// falls as 1/S. The visibilities of the depth-based methods count fragments at
+/// equal depths as in front of each other, which matters where they overlap.
+pub fn promises(values: &Values, basic: Promises) -> Promises {
+    let method: Method = values.choice(METHOD.name);
+    let corrected = matches!(method, Method::AlphaCorrection | Method::DepthCorrection);
+    let together = over_opaque::of(values) == Opaque::Together;
+    let sums = method != Method::Basic;
+    let depth_based = matches!(method, Method::Depth | Method::DepthCorrection);
+    Promises {
+        unbiased: basic.unbiased && !corrected,
+        order: match basic.order {
+            OrderPromise::Independent if sums => OrderPromise::UpToRounding,
+            order => order,
+        },
+        // By their depths alone, opaque fragments at equal depths are all seen.
+        exact_opaque: basic.exact_opaque && !(depth_based && together),
+        ..basic
+    }
+}
+
+/// Whether several rounds are stratified together.
+pub fn strata_over_rounds(values: &Values) -> bool {
+    values.choice::<Strata>(STRATA.name) == Strata::All
+        && values.choice::<Rounds>(ROUNDS.name) != Rounds::One
+}
+
+/// Draws transparent fragments as a [`Method`] says.
+#[derive(Clone, Debug)]
+pub struct Methods<S, const N: usize> {
+    frame: Frame,
+    sampler: S,
+    depth_bits: u32,
+    method: Method,
+    rounds: u32,
+    strata: Strata,
+}
+
+/// A pixel of a stochastic design.
+#[derive(Clone, Debug)]
+pub struct MethodsPixel<T, const N: usize> {
+    samples: Samples<N>,
+    state: T,
+    /// What several passes need; `None` for a single one.
+    sums: Option<Box<Sums<N>>>,
+}
+
+/// What the methods of several passes keep.
+#[derive(Clone, Debug)]
+struct Sums<const N: usize> {
+    /// `1 − α_total` of each sample; without correction, the share of the rounds in
+    /// which the sample stayed empty.
+    transmittance: [f32; N],
+    /// Samples written in this round.
+    occupied: SampleMask,
+    /// `Σ B` over the occupied samples, or `Σ U`, of all rounds so far.
+    colour: [f32; 3],
+    /// The same with colours replaced by 1.
+    weight: f32,
+}
+
+impl<const N: usize> Sums<N> {
+    fn add(&mut self, colour: [f32; 3], weight: f32) {
+        for (sum, c) in self.colour.iter_mut().zip(colour) {
+            *sum += c * weight;
+        }
+        self.weight += weight;
+    }
+}
+
+/// What a pass over the trace does.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Pass {
+    TotalAlpha,
+    Sample(u32),
+    Accumulate(u32),
+}
+
+impl<S: Sampler<N>, const N: usize> Methods<S, N> {
+    fn corrected(&self) -> bool {
+        matches!(self.method, Method::AlphaCorrection | Method::DepthCorrection)
+    }
+
+    fn depth_based(&self) -> bool {
+        matches!(self.method, Method::Depth | Method::DepthCorrection)
+    }
+
+    fn pass(&self, pass: u32) -> Pass {
+        let Some(pass) = pass.checked_sub(u32::from(self.corrected())) else {
+            return Pass::TotalAlpha;
+        };
+        match self.depth_based() {
+            true if pass % 2 == 1 => Pass::Accumulate(pass / 2),
+            true => Pass::Sample(pass / 2),
+            false => Pass::Sample(pass),
+        }
+    }
+
+    fn round(&self, round: u32) -> Round {
+        let seed = self.frame.seed;
+        match self.strata {
+            Strata::All => Round { index: round, count: self.rounds, seed },
+            Strata::Round if round == 0 => Round { index: 0, count: 1, seed },
+            Strata::Round => Round { index: 0, count: 1, seed: hash([seed, round]) },
+        }
+    }
+
+    /// Bits that a written sample takes: the depth-based methods store no colours.
+    fn sample_bits(&self) -> u32 {
+        self.depth_bits + if self.depth_based() { 0 } else { self.frame.colour_bits }
+    }
+
+    fn draw_samples<P: Probe>(
+        &self,
+        round: u32,
+        site: Site,
+        pixel: &mut MethodsPixel<S::State, N>,
+        fragment: &Fragment,
+        probe: &mut P,
+    ) {
+        // Depth and opacity are compared as integers.
+        let z: [Unorm32; N] = self.frame.depths(fragment, self.depth_bits);
+        let MethodsPixel { samples, state, sums } = pixel;
+        let passed = samples.depth_test(fragment.coverage, &z);
+        probe.depth_test(fragment.coverage, passed);
+        probe.state(self.depth_bits * fragment.coverage.count(), 0);
+        let round = self.round(round);
+        let written =
+            self.sampler.choose(round, site, state, &samples.depth, passed, fragment, probe);
+        for s in written.iter() {
+            samples.write(s, z[s], fragment.colour);
+        }
+        if let Some(sums) = sums {
+            sums.occupied |= written;
+        }
+        probe.written(written);
+        probe.state(0, self.sample_bits() * written.count());
+    }
+
+    /// E equation 5: the product of what the fragments let through.
+    fn draw_alpha<P: Probe>(&self, sums: &mut Sums<N>, fragment: &Fragment, probe: &mut P) {
+        for s in fragment.coverage.iter() {
+            sums.transmittance[s] *= 1.0 - fragment.alpha;
+        }
+        let bits = 32 * fragment.coverage.count();
+        probe.state(bits, bits);
+    }
+
+    /// E equations 4 and 6: the fragment, weighed by the share of the samples that it
+    /// lies not behind.
+    fn accumulate<P: Probe>(
+        &self,
+        pixel: &mut MethodsPixel<S::State, N>,
+        fragment: &Fragment,
+        probe: &mut P,
+    ) {
+        let z: [Unorm32; N] = self.frame.depths(fragment, self.depth_bits);
+        let visible = pixel.samples.depth_test(fragment.coverage, &z);
+        probe.depth_test(fragment.coverage, visible);
+        let sums = pixel.sums.as_mut().expect("it has sums");
+        sums.add(fragment.colour, fragment.alpha * visible.count() as f32);
+        probe.written(visible);
+        // One sum a pixel: with a box filter it holds what a multisample buffer would.
+        probe.state(self.depth_bits * fragment.coverage.count() + 128, 128);
+    }
+}
+
+impl<S: Sampler<N>, const N: usize> Transparent<N> for Methods<S, N> {
+    type Pixel = MethodsPixel<S::State, N>;
+
+    fn passes(&self) -> u32 {
+        let of_a_round = if self.depth_based() { 2 } else { 1 };
+        u32::from(self.corrected()) + self.rounds * of_a_round
+    }
+
+    fn state_bits(&self) -> StateBits {
+        let samples = N as u32;
+        let transmittance = match self.method {
+            Method::Basic => 0,
+            Method::AlphaCorrection => 32 + 1,
+            Method::DepthCorrection => 32,
+            // How often the sample stayed empty.
+            Method::Depth => self.rounds.ilog2() + 1,
+        };
+        let sums = if self.depth_based() || self.rounds > 1 { 4 * 32 } else { 0 };
+        StateBits {
+            samples: samples * self.sample_bits(),
+            extra: self.sampler.state_bits() + samples * transmittance + sums,
+            unbounded: false,
+        }
+    }
+
+    fn clear(&self, site: Site) -> Self::Pixel {
+        let several = self.method != Method::Basic || self.rounds > 1;
+        let sums = Sums {
+            transmittance: [if self.corrected() { 1.0 } else { 0.0 }; N],
+            occupied: SampleMask::NONE,
+            colour: [0.0; 3],
+            weight: 0.0,
+        };
+        MethodsPixel {
+            samples: Samples::cleared(self.frame.background),
+            state: self.sampler.clear(site),
+            sums: several.then(|| Box::new(sums)),
+        }
+    }
+
+    #[inline]
+    fn draw<P: Probe>(
+        &self,
+        pass: u32,
+        site: Site,
+        pixel: &mut Self::Pixel,
+        fragment: &Fragment,
+        probe: &mut P,
+    ) {
+        match self.pass(pass) {
+            Pass::Sample(round) => self.draw_samples(round, site, pixel, fragment, probe),
+            Pass::Accumulate(_) => self.accumulate(pixel, fragment, probe),
+            Pass::TotalAlpha => {
+                self.draw_alpha(pixel.sums.as_mut().expect("it has sums"), fragment, probe);
+            }
+        }
+    }
+
+    /// Adds a finished round to the sums.
+    fn end_pass(&self, pass: u32, site: Site, pixel: &mut Self::Pixel) {
+        let MethodsPixel { samples, state, sums: Some(sums) } = pixel else { return };
+        let round = match (self.pass(pass), self.depth_based()) {
+            (Pass::Sample(round), false) | (Pass::Accumulate(round), true) => round,
+            _ => return,
+        };
+        match self.method {
+            Method::Basic => samples.colour.iter().for_each(|c| sums.add(*c, 1.0)),
+            Method::AlphaCorrection => {
+                sums.occupied.iter().for_each(|s| sums.add(samples.colour[s], 1.0));
+            }
+            Method::Depth => {
+                for s in (0..N).filter(|s| !sums.occupied.contains(*s)) {
+                    sums.transmittance[s] += 1.0 / self.rounds as f32;
+                }
+            }
+            Method::DepthCorrection => {}
+        }
+        if round + 1 < self.rounds {
+            *samples = Samples::cleared(self.frame.background);
+            *state = self.sampler.clear(site);
+            sums.occupied = SampleMask::NONE;
+        }
+    }
+
+    fn resolve(&self, _site: Site, pixel: &Self::Pixel, behind: &[[f32; 3]; N]) -> [f64; 3] {
+        let Some(sums) = &pixel.sums else {
+            return box_filter(&pixel.samples.colour);
+        };
+        let samples = N as f64;
+        let mean = 1.0 / (samples * f64::from(self.rounds));
+        let mut behind_it = [0.0; 3];
+        let mut let_through = 0.0;
+        for (t, colour) in sums.transmittance.iter().zip(behind) {
+            for (sum, c) in behind_it.iter_mut().zip(colour) {
+                *sum += f64::from(t * c) / samples;
+            }
+            let_through += f64::from(*t) / samples;
+        }
+        // The correction's factor, `C_α / F(B1)` or `C_α / F(U1)`, or none.
+        let factor = match self.corrected() {
+            false => mean,
+            true if sums.weight > 0.0 => (1.0 - let_through) / f64::from(sums.weight),
+            true => 0.0,
+        };
+        std::array::from_fn(|i| factor * f64::from(sums.colour[i]) + behind_it[i])
+    }
+
+    fn contents(&self, pixel: &Self::Pixel) -> Contents {
+        let mut contents = Contents {
+            samples: pixel.samples.contents(),
+            fields: self.sampler.fields(&pixel.state),
+        };
+        if let Some(sums) = &pixel.sums {
+            let mean = sums.transmittance.iter().sum::<f32>() / N as f32;
+            let [r, g, b] = sums.colour;
+            contents.fields.push(("through", format!("{mean:.4}")));
+            contents
+                .fields
+                .push(("sum", format!("{r:.3} {g:.3} {b:.3}, weight {:.3}", sums.weight)));
+        }
+        contents
+    }
+}
