@@ -8,8 +8,11 @@ use clap::Args;
 use crate::cli::console::{Console, shown};
 use crate::error::{Error, Result};
 use crate::output::OutputFile;
+use crate::param::Options;
 use crate::picture::write_png;
-use crate::report::{figures, results};
+use crate::report::{Measured, Part, results};
+use crate::study::comparison::compare;
+use crate::study::publications::methods::methods;
 use crate::study::publications::{Effort, reproduce};
 
 /// Rerun the publications' experiments and write RESULTS.md with its figures
@@ -31,6 +34,18 @@ pub(super) struct Arguments {
     /// Frame side in pixels
     #[arg(long, default_value_t = 800, value_name = "PIXELS", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(128..=4096))]
     side: u32,
+    /// Frame side in pixels of the comparison of all designs
+    #[arg(long, default_value_t = 160, value_name = "PIXELS", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(32..=4096))]
+    comparison_side: u32,
+    /// Measure only this part; the others stay in RESULTS.md as they are
+    #[arg(long, value_name = "PART", value_parser = part)]
+    part: Option<Part>,
+}
+
+fn part(text: &str) -> std::result::Result<Part, String> {
+    let names = || Part::CHOICES.iter().map(|c| c.name);
+    let found = names().position(|name| name == text);
+    found.map(|i| Part::ALL[i]).ok_or_else(|| Error::unknown("part", text, names()).to_string())
 }
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
@@ -41,6 +56,11 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let folder = arguments.output.join("figures");
     std::fs::create_dir_all(&folder).map_err(|e| Error::io("create", &folder, e))?;
     let path = arguments.output.join("RESULTS.md");
+    let before = match std::fs::read_to_string(&path) {
+        Ok(text) => text,
+        Err(e) if e.kind() == io::ErrorKind::NotFound => String::new(),
+        Err(e) => return Err(Error::io("read", &path, e)),
+    };
     // The work takes hours: that it can be written is found out before.
     let mut file = OutputFile::create(&path)?;
     drop(OutputFile::create(folder.join("figure.png"))?);
@@ -50,16 +70,34 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         side: arguments.side,
     };
     let progress = console.progress("reproducing", "steps");
-    let publications = reproduce(arguments.models.as_deref(), effort, |what, done, total| {
+    let watch = |what: &str, done, total| {
         progress.name(what);
         progress.set(done, total);
-    })?;
+    };
+    let models = arguments.models.as_deref();
+    let wanted = |part| arguments.part.is_none_or(|only| only == part);
+    let publications =
+        wanted(Part::LaineKarras).then(|| reproduce(models, effort, watch)).transpose()?;
+    let methods = wanted(Part::Methods).then(|| methods(models, effort, watch)).transpose()?;
+    let comparison = wanted(Part::Comparison)
+        .then(|| compare(models, arguments.comparison_side, arguments.seeds, watch))
+        .transpose()?;
     drop(progress);
-    for missing in &publications.missing {
+    let missing = publications.iter().flat_map(|p| &p.missing);
+    let missing = missing.chain(comparison.iter().flat_map(|c| &c.missing));
+    for missing in missing {
         console.warn(&format!("{missing}: not in the models' folder; its table is left out"));
     }
-    let pictures = figures(&publications);
-    let text = results(&publications, "figures");
+    let measured: Vec<Measured<'_>> = [
+        publications.as_ref().map(Measured::LaineKarras),
+        methods.as_ref().map(Measured::Methods),
+        comparison.as_ref().map(Measured::Comparison),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    let pictures: Vec<_> = measured.iter().flat_map(Measured::figures).collect();
+    let text = results(&before, &measured, "figures");
     let save = || {
         for (name, picture) in &pictures {
             write_png(folder.join(format!("{name}.png")), picture)?;

@@ -1,14 +1,18 @@
 //! The designs, one file each, and their registry.
 
+mod alpha_to_coverage;
 mod enderton;
 mod exact;
+mod hashed_alpha;
 mod lk;
 mod systematic;
 
 use std::fmt;
 
+pub use alpha_to_coverage::AlphaToCoverage;
 pub use enderton::Enderton;
 pub use exact::Exact;
+pub use hashed_alpha::HashedAlpha;
 pub use lk::LaineKarras;
 pub use systematic::Systematic;
 
@@ -26,6 +30,8 @@ pub static DESIGNS: &[Entry] = &[
     Entry::of::<LaineKarras>(),
     Entry::of::<Systematic>(),
     Entry::of::<Enderton>(),
+    Entry::of::<HashedAlpha>(),
+    Entry::of::<AlphaToCoverage>(),
 ];
 
 /// The name of the design that others are measured against.

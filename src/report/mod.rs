@@ -4,7 +4,7 @@ mod montage;
 mod results;
 
 pub use montage::{Panel, montage};
-pub use results::{FIGURES, Figure, figures, results};
+pub use results::{FIGURES, Figure, Measured, Part, results};
 
 /// A Markdown table; columns of numbers stand to the right.
 pub fn markdown_table(header: &[&str], rows: &[Vec<String>]) -> String {

@@ -140,8 +140,12 @@ impl Probe for EventCounts {
 pub struct Record {
     /// Samples that the fragment covers.
     pub covered: SampleMask,
-    /// Samples that passed the depth test; `None` where the design makes none.
+    /// Samples that passed the last depth test; `None` where the design makes none.
     pub passed: Option<SampleMask>,
+    /// Samples put to depth tests; a design may test against several buffers.
+    pub samples_tested: u32,
+    /// Samples that passed them.
+    pub samples_passed: u32,
     /// The new surface's number, where one was started.
     pub surface: Option<u32>,
     /// The samples' order after sorting, where they were sorted.
@@ -175,8 +179,10 @@ impl Probe for Record {
     fn fragment(&mut self, covered: SampleMask) {
         self.covered = covered;
     }
-    fn depth_test(&mut self, _tested: SampleMask, passed: SampleMask) {
+    fn depth_test(&mut self, tested: SampleMask, passed: SampleMask) {
         self.passed = Some(passed);
+        self.samples_tested += tested.count();
+        self.samples_passed += passed.count();
     }
     fn surface(&mut self, number: u32) {
         self.surface = Some(number);

@@ -157,7 +157,9 @@ fn the_expectation_is_exact_where_it_is_promised_and_only_there() {
     let variants = all_variants();
     variants.par_iter().for_each(|design| {
         let mut biased = Vec::new();
-        for samples in [4, 8] {
+        // What is promised is tested at 8 samples; a bias may be shown at either count.
+        let counts: &[u32] = if design.promises().unbiased { &[8] } else { &[4, 8] };
+        for samples in counts.iter().copied() {
             let (good, figures) = looks_unbiased(design, samples, variants.len());
             if design.promises().unbiased {
                 assert!(good, "{figures}");

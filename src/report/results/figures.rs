@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use crate::picture::Picture;
 use crate::report::{Panel, montage};
-use crate::study::publications::Publications;
+use crate::study::publications::{NamedPicture, Publications};
 
 /// A figure of the document: its file and what it is made of.
 #[derive(Clone, Copy, Debug)]
@@ -25,6 +25,15 @@ pub struct Figure {
 
 /// All figures.
 pub const FIGURES: &[Figure] = &[
+    Figure {
+        file: "figure-8",
+        panels: &["figure-8-enderton", "figure-8-lk", "figure-8-exact"],
+        columns: 3,
+        enlarge: 1,
+        part: None,
+        caption: "LK figure 8: smoke as billboards of alpha 0.05 at 16 samples, `enderton`, `lk` and \
+                  `exact`.",
+    },
     Figure {
         file: "figure-1",
         panels: &["figure-1-enderton", "figure-1-lk"],
@@ -97,19 +106,20 @@ pub const FIGURES: &[Figure] = &[
 const GALLERY: &str = "scenes";
 
 /// The document's figures: file names and pictures.
-pub fn figures(publications: &Publications) -> Vec<(&'static str, Picture)> {
+pub(super) fn figures(publications: &Publications) -> Vec<(&'static str, Picture)> {
     let scenes: Vec<Panel<'_>> = publications
         .gallery
         .iter()
         .map(|(_, picture)| Panel { picture, crop: None, enlarge: 1 })
         .collect();
     let mut list = vec![(GALLERY, montage(&scenes, 4))];
-    list.extend(paper_figures(publications));
+    list.extend(of(&publications.pictures));
     list
 }
 
-fn paper_figures(publications: &Publications) -> Vec<(&'static str, Picture)> {
-    let find = |name: &str| publications.pictures.iter().find(|(n, _)| *n == name);
+/// The figures that can be made of `pictures`.
+pub(super) fn of(pictures: &[NamedPicture]) -> Vec<(&'static str, Picture)> {
+    let find = |name: &str| pictures.iter().find(|(n, _)| *n == name);
     FIGURES
         .iter()
         .filter_map(|figure| {
@@ -137,7 +147,12 @@ pub(super) fn pictures(text: &mut String, p: &Publications, folder: &str) {
          The built-in scenes, composited exactly: {}.\n",
         scenes.join(", ")
     );
-    let there: Vec<&str> = p.pictures.iter().map(|(name, _)| *name).collect();
+    show(text, &p.pictures, folder);
+}
+
+/// Shows the figures that are made of `pictures`.
+pub(super) fn show(text: &mut String, pictures: &[NamedPicture], folder: &str) {
+    let there: Vec<&str> = pictures.iter().map(|(name, _)| *name).collect();
     for figure in FIGURES.iter().filter(|f| f.panels.iter().all(|n| there.contains(n))) {
         let _ = writeln!(
             text,

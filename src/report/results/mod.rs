@@ -1,18 +1,105 @@
 //! `docs/RESULTS.md`: the publications' figures beside ours.
 
+mod comparison;
 mod figures;
+mod methods;
 mod table_1;
 
 use std::fmt::Write;
 
-pub use figures::{FIGURES, Figure, figures};
+pub use figures::{FIGURES, Figure};
 
 use crate::metrics::{Estimate, student_t};
+use crate::param::Options;
+use crate::picture::Picture;
 use crate::report::markdown_table;
+use crate::study::comparison::Comparison;
+use crate::study::publications::methods::Methods;
 use crate::study::publications::{BLOCKS, DESIGNS, MeanError, Publications};
 
-/// The document. `figure_folder` is where the figures lie, as seen from it.
-pub fn results(p: &Publications, figure_folder: &str) -> String {
+crate::options! {
+    /// A part of the document that can be measured on its own.
+    pub enum Part {
+        LaineKarras = "lk": "Laine and Karras: table 1, expectations, figures",
+        Methods = "methods": "Enderton's examples, Wyman's probabilities, hashes, LK figure 8",
+        Comparison = "comparison": "all designs over the same fragments",
+    }
+}
+
+/// What was measured for one part.
+#[derive(Debug)]
+pub enum Measured<'a> {
+    /// [`Part::LaineKarras`].
+    LaineKarras(&'a Publications),
+    /// [`Part::Methods`].
+    Methods(&'a Methods),
+    /// [`Part::Comparison`].
+    Comparison(&'a Comparison),
+}
+
+impl Measured<'_> {
+    /// Which part it is.
+    pub fn part(&self) -> Part {
+        match self {
+            Measured::LaineKarras(_) => Part::LaineKarras,
+            Measured::Methods(_) => Part::Methods,
+            Measured::Comparison(_) => Part::Comparison,
+        }
+    }
+
+    /// The part's text. `folder` is where the figures lie, as seen from the document.
+    fn text(&self, folder: &str) -> String {
+        match self {
+            Measured::LaineKarras(p) => laine_karras(p, folder),
+            Measured::Methods(m) => {
+                let mut text = methods::text(m);
+                figures::show(&mut text, &m.pictures, folder);
+                text
+            }
+            Measured::Comparison(c) => comparison::text(c),
+        }
+    }
+
+    /// The part's figures by file name.
+    pub fn figures(&self) -> Vec<(&'static str, Picture)> {
+        match self {
+            Measured::LaineKarras(p) => figures::figures(p),
+            Measured::Methods(m) => figures::of(&m.pictures),
+            Measured::Comparison(_) => Vec::new(),
+        }
+    }
+}
+
+/// The document: what was `measured`, and of the other parts what the document said
+/// `before`. `folder` is where the figures lie, as seen from it.
+pub fn results(before: &str, measured: &[Measured<'_>], folder: &str) -> String {
+    let mut text = PREAMBLE.to_string();
+    for (part, choice) in Part::ALL.iter().zip(Part::CHOICES) {
+        let [start, end] =
+            ["begin", "end"].map(|edge| format!("<!-- {edge} of part {} -->\n", choice.name));
+        let new = measured.iter().find(|m| m.part() == *part).map(|m| m.text(folder));
+        let old = || {
+            let from = before.find(&start)? + start.len();
+            let length = before[from..].find(&end)?;
+            Some(before[from..from + length].to_string())
+        };
+        if let Some(part) = new.or_else(old) {
+            let _ = write!(text, "{start}{part}{end}");
+        }
+    }
+    text
+}
+
+const PREAMBLE: &str = "# Results\n\n\
+    Written by `screendoor reproduce`, the figures within sentences too; `--part` measures one part \
+    and leaves the others as they are. Errors are in 8-bit units (1/255 of the range from black to \
+    white), on linear values where nothing else is said. ± and [ ] are 95 % intervals over seeds: \
+    Student's t on the mean square, and for ratios both sides' relative widths in quadrature.\n\n\
+    LK is Laine and Karras, *Stratified Sampling for Stochastic Transparency*, EGSR 2011. To rerun: \
+    `screendoor reproduce --models FOLDER`, where the folder holds the models named below (without \
+    it the built-in scenes are measured).\n\n";
+
+fn laine_karras(p: &Publications, folder: &str) -> String {
     let mut text = String::new();
     preamble(&mut text, p);
     for (i, table) in p.table_1.iter().enumerate() {
@@ -24,22 +111,14 @@ pub fn results(p: &Publications, figure_folder: &str) -> String {
     table_1::account(&mut text, p);
     expectations(&mut text, p);
     figure_5(&mut text, p);
-    figures::pictures(&mut text, p, figure_folder);
+    figures::pictures(&mut text, p, folder);
     text
 }
 
 fn preamble(text: &mut String, p: &Publications) {
     let _ = writeln!(
         text,
-        "# Results\n\n\
-         Written by `screendoor reproduce`, the figures within sentences too. Errors are in 8-bit \
-         units (1/255 of the range from black to white), on linear values where nothing else is \
-         said. ± and [ ] are 95 % intervals over seeds: Student's t on the mean square, and \
-         for ratios both sides' relative widths in quadrature.\n\n\
-         LK is Laine and Karras, *Stratified Sampling for Stochastic Transparency*, EGSR 2011. \
-         To rerun: `screendoor reproduce --models FOLDER`, where the folder holds the models \
-         named below (without it the built-in scenes are measured).\n\n\
-         ## LK table 1\n\n\
+        "## LK table 1\n\n\
          RMSE over the covered pixels against the exact picture of all 64 samples, so that \
          missing antialiasing counts as it does against the paper's reference of thousands of \
          samples; {} × {} pixels, {} seeds. `naive` is `enderton:mask=naive`, which tests every \

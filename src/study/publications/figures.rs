@@ -46,7 +46,7 @@ pub(super) fn gallery() -> Result<Vec<(String, Picture)>> {
 pub type NamedPicture = (&'static str, Picture);
 
 /// The picture averaged over blocks of `side` × `side` pixels.
-fn averaged(picture: &Picture, side: u32) -> Picture {
+pub(super) fn averaged(picture: &Picture, side: u32) -> Picture {
     let grid = TileGrid::new(picture.width() / side, picture.height() / side);
     Picture::from_fn(grid, |x, y| {
         let mut sum = [0.0; 3];

@@ -1,6 +1,9 @@
 //! The experiments of Laine and Karras 2011, on scenes that we have.
 
+pub mod examples;
 mod figures;
+pub mod hashes;
+pub mod methods;
 mod sampling;
 mod table_1;
 
@@ -13,13 +16,16 @@ pub use sampling::{FarSamples, MeanError, RowDifference};
 pub use table_1::{Aspect, COUNTS, DESIGNS, Published, Table1, Variation};
 
 pub use crate::capture::Order;
-use crate::capture::{Capture, CaptureOptions};
+use crate::capture::{Capture, CaptureOptions, PatternKind, pattern};
 use crate::design::{Configured, configure};
 use crate::error::Result;
 use crate::picture::Picture;
 use crate::rop::{ReplayOptions, Replayed};
 use crate::scene;
-use crate::trace::Trace;
+use crate::trace::{
+    ColourFormat, DepthPlane, Fragment, Header, SampleMask, Trace, TraceWriter, Unorm32,
+    WriteOptions,
+};
 
 /// How much to spend.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -107,6 +113,42 @@ fn capture(source: &str, options: &CaptureOptions, white: bool) -> Result<Trace>
         scene.whiten();
     }
     Capture::new(&scene, options)?.to_memory(|_, _| ())
+}
+
+/// A trace of whole layers, nearest first, over every pixel of a square frame; the
+/// nearest is the first primitive and is drawn first.
+fn whole_layers(
+    side: u32,
+    samples: u32,
+    background: [f32; 3],
+    layers: &[([f32; 3], f32)],
+) -> Result<Trace> {
+    let header = Header {
+        width: side,
+        height: side,
+        pattern: pattern(PatternKind::Standard, samples)?,
+        background,
+        colour: ColourFormat::F32,
+        source: format!("{} whole layers", layers.len()),
+        camera: "none".to_string(),
+        constants: Default::default(),
+    };
+    let mut writer = TraceWriter::new(Vec::new(), "memory", header, WriteOptions::default())?;
+    for (i, (colour, alpha)) in layers.iter().enumerate() {
+        for (x, y) in (0..side).flat_map(|y| (0..side).map(move |x| (x, y))) {
+            writer.push(&Fragment {
+                x: x as u16,
+                y: y as u16,
+                coverage: SampleMask::first(samples),
+                depth: DepthPlane { z: Unorm32((i as u32 + 1) << 24), dzdx: 0, dzdy: 0 },
+                colour: *colour,
+                alpha: *alpha,
+                primitive: i as u32,
+                object: i as u32,
+            })?;
+        }
+    }
+    Trace::from_bytes(writer.finish()?.0, "memory")
 }
 
 fn designs(specs: &[&str]) -> Result<Vec<Configured>> {

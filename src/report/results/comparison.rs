@@ -1,0 +1,278 @@
+//! The results' part on all designs over the same fragments.
+
+use std::fmt::Write;
+
+use crate::report::markdown_table;
+use crate::study::comparison::{ComparedScene, Comparison, Duel, Result1};
+
+/// Counts of the printed tables.
+const SHOWN: [u32; 3] = [4, 8, 16];
+/// Budgets of state in bytes per pixel of the table of winners.
+const BUDGETS: [f64; 5] = [48.0, 96.0, 192.0, 384.0, 768.0];
+
+/// The text of the part.
+pub(super) fn text(c: &Comparison) -> String {
+    let mut text = String::new();
+    preamble(&mut text, c);
+    for count in SHOWN {
+        table(&mut text, c, count);
+    }
+    methods(&mut text, c);
+    slab(&mut text, c);
+    winners(&mut text, c);
+    duels(&mut text, c);
+    text
+}
+
+fn preamble(text: &mut String, c: &Comparison) {
+    let _ = writeln!(
+        text,
+        "## All designs over the same fragments\n\n\
+         Every design of the registry with its defaults, and with each of its methods, at n \
+         samples per pixel and, where it keeps layers, n layers (`slab`: 2n coverage bits, as in \
+         Wyman's figure 1); {} × {} pixels, {} seeds of what is random. RMSE over the covered \
+         pixels against the exact picture of the same samples, in 8-bit units, and in brackets its \
+         bias: the root mean square of the pixels' mean errors, which no number of seeds or \
+         frames averages away (0 for what is unbiased; estimated, so that small values are \
+         noise). *State*: bytes per pixel in hardware, without a z-buffer for opaque geometry \
+         where the scene has none. *Passes* over the trace. Designs without noise have their whole \
+         error as bias.\n",
+        c.side, c.side, c.seeds
+    );
+    let rows: Vec<Vec<String>> = c
+        .scenes
+        .iter()
+        .map(|s| {
+            let t = &s.statistics;
+            vec![
+                s.name.to_string(),
+                format!("{:.2} M", t.fragments as f64 / 1e6),
+                format!("{:.1}", t.depth_complexity.mean),
+                t.depth_complexity.p95.to_string(),
+                t.depth_complexity.max.to_string(),
+                format!("{:.2}", t.alpha.mean),
+                format!("{:.0} %", 100.0 * t.alpha.opaque as f64 / t.fragments.max(1) as f64),
+            ]
+        })
+        .collect();
+    let header =
+        ["scene", "fragments", "per covered pixel", "95 %", "most", "mean alpha", "opaque"];
+    text.push_str(&markdown_table(&header, &rows));
+    for missing in &c.missing {
+        let _ = writeln!(text, "\n`{missing}` was not given and is left out.");
+    }
+    text.push('\n');
+}
+
+fn bytes(r: &Result1) -> String {
+    if r.unbounded { "grows".to_string() } else { format!("{:.0}", r.state_bytes) }
+}
+
+/// Smallest and largest of what differs from scene to scene.
+fn range(values: impl Iterator<Item = String>) -> String {
+    let mut values: Vec<String> = values.collect();
+    values.dedup();
+    let least = values.iter().min_by_key(|v| v.parse::<u64>().unwrap_or(u64::MAX));
+    let most = values.iter().max_by_key(|v| v.parse::<u64>().unwrap_or(u64::MAX));
+    match (least, most) {
+        (Some(a), Some(b)) if a == b => a.clone(),
+        (Some(a), Some(b)) => format!("{a} to {b}"),
+        _ => String::new(),
+    }
+}
+
+fn table(text: &mut String, c: &Comparison, count: u32) {
+    let _ = writeln!(text, "### {count} samples or layers\n");
+    let mut header = vec!["design", "state", "passes"];
+    header.extend(c.scenes.iter().map(|s| s.name));
+    let rows: Vec<Vec<String>> = (0..c.contenders.len())
+        .map(|i| {
+            let results = || c.scenes.iter().filter_map(|s| s.result(i, count));
+            let mut row = vec![
+                format!("`{}`", c.contenders[i].label),
+                range(results().map(bytes)),
+                range(results().map(|r| r.passes.to_string())),
+            ];
+            row.extend(c.scenes.iter().map(|s| s.result(i, count).map_or("—".into(), cell)));
+            row
+        })
+        .collect();
+    text.push_str(&markdown_table(&header, &rows));
+    text.push('\n');
+}
+
+fn cell(r: &Result1) -> String {
+    format!("{:.1} ({:.1})", r.errors.rmse.value, r.bias())
+}
+
+/// The geometric mean over the scenes of the ratio of two contenders' errors.
+fn mean_ratio(c: &Comparison, a: usize, b: usize, count: u32) -> Option<f64> {
+    let logs: Vec<f64> = c
+        .scenes
+        .iter()
+        .filter_map(|s| {
+            let error = |i| s.result(i, count).map(|r| r.errors.rmse.value.max(1e-3));
+            Some((error(a)? / error(b)?).ln())
+        })
+        .collect();
+    (!logs.is_empty()).then(|| (logs.iter().sum::<f64>() / logs.len() as f64).exp())
+}
+
+/// What LK's and systematic sampling gain in Enderton's methods.
+fn methods(text: &mut String, c: &Comparison) {
+    let _ = writeln!(
+        text,
+        "### LK and systematic sampling in the methods of several passes\n\n\
+         LK leave it to future work to quantify what their samples gain in the methods of \
+         Enderton et al. RMSE relative to `enderton` with the same method and samples, the \
+         geometric mean over the scenes; below 1 is better.\n"
+    );
+    let mut rows = Vec::new();
+    for method in ["", ":method=alpha-correction", ":method=depth", ":method=depth-correction"] {
+        for design in ["lk", "systematic"] {
+            let pair = (
+                c.contender(&format!("{design}{method}")),
+                c.contender(&format!("enderton{method}")),
+            );
+            let (Some(a), Some(b)) = pair else { continue };
+            let mut row = vec![format!("`{design}{method}`")];
+            for count in SHOWN.into_iter().chain([32]) {
+                let ratio = mean_ratio(c, a, b, count);
+                row.push(ratio.map_or("—".to_string(), |r| format!("{r:.3}")));
+            }
+            rows.push(row);
+        }
+    }
+    text.push_str(&markdown_table(&["design", "4", "8", "16", "32"], &rows));
+    text.push('\n');
+}
+
+/// 'Better than 32× samples for about the memory of 8×'.
+fn slab(text: &mut String, c: &Comparison) {
+    let _ = writeln!(
+        text,
+        "### SLAB's claim\n\n\
+         Wyman 2016: better than 32 samples of stochastic transparency for about the memory and \
+         cost of 8. RMSE of `slab` with 8 layers, state in bytes per pixel, and of stochastic \
+         transparency with the same normalisation at 8, 16 and 32 samples.\n"
+    );
+    let pairs = [
+        ("slab", "enderton:method=depth-correction"),
+        ("slab:normalise=none", "enderton"),
+        ("slab:normalise=alpha", "enderton:method=alpha-correction"),
+        ("slab:normalise=depth", "enderton:method=depth"),
+        ("slab:opacity=discrete", "enderton:method=depth-correction"),
+    ];
+    let mut rows = Vec::new();
+    let mut verdicts = Vec::new();
+    for (slab, stochastic) in pairs {
+        let (Some(a), Some(b)) = (c.contender(slab), c.contender(stochastic)) else { continue };
+        let mut confirmed = 0;
+        for scene in &c.scenes {
+            let (Some(eight), Some(many)) = (scene.result(a, 8), scene.result(b, 32)) else {
+                continue;
+            };
+            let better = eight.errors.rmse.value < many.errors.rmse.value;
+            confirmed += u32::from(better);
+            let mut row = vec![
+                format!("`{slab}`"),
+                scene.name.to_string(),
+                format!("{:.2}", eight.errors.rmse.value),
+                format!("{:.0}", eight.state_bytes),
+            ];
+            for count in [8, 16, 32] {
+                let shown =
+                    |r: &Result1| format!("{:.2} ({:.0} B)", r.errors.rmse.value, r.state_bytes);
+                row.push(scene.result(b, count).map_or("—".to_string(), shown));
+            }
+            row.push(if better { "confirmed" } else { "refuted" }.to_string());
+            rows.push(row);
+        }
+        verdicts.push(format!(
+            "`{slab}` with 8 layers beats `{stochastic}` with 32 samples on {confirmed} of {} scenes",
+            c.scenes.len()
+        ));
+    }
+    let _ = writeln!(text, "{}.\n", verdicts.join("; "));
+    let header = ["design", "scene", "8 layers", "bytes", "8 samples", "16", "32", "claim"];
+    text.push_str(&markdown_table(&header, &rows));
+    text.push('\n');
+}
+
+/// Who has the least error within a budget of state.
+fn winners(text: &mut String, c: &Comparison) {
+    let _ = writeln!(
+        text,
+        "### Who wins within a budget\n\n\
+         The design with the least RMSE among all whose state fits, at any of {} samples or \
+         layers; then the best of those that read the trace once.\n",
+        crate::study::comparison::COUNTS.map(|n| n.to_string()).join(", ")
+    );
+    let budgets: Vec<String> = BUDGETS.iter().map(|b| format!("{b:.0} bytes")).collect();
+    let mut header = vec!["scene", "passes"];
+    header.extend(budgets.iter().map(String::as_str));
+    let mut rows = Vec::new();
+    for scene in &c.scenes {
+        for single in [false, true] {
+            let mut row =
+                vec![scene.name.to_string(), if single { "one" } else { "any" }.to_string()];
+            row.extend(BUDGETS.iter().map(|budget| winner(c, scene, *budget, single)));
+            rows.push(row);
+        }
+    }
+    text.push_str(&markdown_table(&header, &rows));
+    text.push('\n');
+}
+
+fn winner(c: &Comparison, scene: &ComparedScene, budget: f64, single: bool) -> String {
+    let fits = |r: &&Result1| !r.unbounded && r.state_bytes <= budget && (!single || r.passes == 1);
+    let best = scene
+        .results
+        .iter()
+        .filter(fits)
+        .min_by(|a, b| a.errors.rmse.value.total_cmp(&b.errors.rmse.value));
+    best.map_or("—".to_string(), |r| {
+        format!("`{}` {}: {:.1}", c.contenders[r.contender].label, r.count, r.errors.rmse.value)
+    })
+}
+
+/// Every pair at equal state.
+fn duels(text: &mut String, c: &Comparison) {
+    let _ = writeln!(
+        text,
+        "### Every pair at equal state\n\n\
+         Scenes on which the row's design has the smaller error, and on which the column's has, with \
+         the same bytes of state: the geometric mean of the ratio of their errors over the state \
+         sizes of either that both can keep to, each with the best count that fits; within 2 % \
+         neither wins. — where no state size suits both.\n"
+    );
+    let bounded: Vec<usize> = (0..c.contenders.len())
+        .filter(|i| {
+            c.scenes.iter().flat_map(|s| &s.results).any(|r| r.contender == *i && !r.unbounded)
+        })
+        .collect();
+    let numbers: Vec<String> = bounded.iter().map(|i| (i + 1).to_string()).collect();
+    let mut header = vec!["", "design", "won", "lost"];
+    header.extend(numbers.iter().map(String::as_str));
+    let rows: Vec<Vec<String>> = bounded
+        .iter()
+        .map(|a| {
+            let duels: Vec<Duel> = bounded.iter().map(|b| c.duel(*a, *b)).collect();
+            let sum = |of: fn(&Duel) -> u32| duels.iter().map(of).sum::<u32>().to_string();
+            let mut row = vec![
+                (a + 1).to_string(),
+                format!("`{}`", c.contenders[*a].label),
+                sum(|d| d.won),
+                sum(|d| d.lost),
+            ];
+            row.extend(bounded.iter().zip(&duels).map(|(b, d)| match d {
+                _ if a == b => String::new(),
+                Duel { won: 0, lost: 0, even: 0 } => "—".to_string(),
+                d => format!("{}:{}", d.won, d.lost),
+            }));
+            row
+        })
+        .collect();
+    text.push_str(&markdown_table(&header, &rows));
+    text.push('\n');
+}

@@ -1,0 +1,368 @@
+//! All designs over the same fragments: error and bias, state and passes; and the
+//! question who wins at equal state.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use crate::capture::{Capture, CaptureOptions, Faces, Order};
+use crate::design::{Configured, DESIGNS, Entry, REFERENCE, configure};
+use crate::error::Result;
+use crate::metrics::{Ensemble, EnsembleErrors, PixelClasses};
+use crate::param::Kind;
+use crate::rop::{Family, Frame, ReplayOptions};
+use crate::scene;
+use crate::trace::{Statistics, Trace, statistics};
+
+/// Samples per pixel, or layers, that every design is run with.
+pub const COUNTS: [u32; 5] = [2, 4, 8, 16, 32];
+
+/// A scene of the comparison and how it is captured.
+#[derive(Clone, Copy, Debug)]
+struct SceneSpec {
+    name: &'static str,
+    /// A file in the models' folder, or a built-in scene.
+    source: &'static str,
+    texture: Option<&'static str>,
+    /// The alpha of surfaces that have none of their own.
+    alpha: Option<f32>,
+    order: Order,
+}
+
+const fn scene(name: &'static str, source: &'static str, alpha: Option<f32>) -> SceneSpec {
+    SceneSpec { name, source, texture: None, alpha, order: Order::Api }
+}
+
+const MODELS: [SceneSpec; 9] = [
+    scene("cycloidal", "cycloidal.glb", Some(0.3)),
+    SceneSpec {
+        order: Order::Random,
+        ..scene("drape", "codimipc_multilayer_drape.obj", Some(0.4))
+    },
+    scene("sheen cloth", "SheenCloth/SheenCloth.gltf", Some(0.4)),
+    SceneSpec { texture: Some("oak_leaf_color.png"), ..scene("oak", "oak_large_leaves.obj", None) },
+    scene("mohawk", "Ratboy_mohawk.tfx", None),
+    scene("smoke", "openusd_smoke_000003.vdb", Some(0.05)),
+    scene("guitar", "guitar.compressed.ply", None),
+    scene("lamp", "StainedGlassLamp/StainedGlassLamp.gltf", None),
+    scene("neon sign", "love_neon_sign.glb", None),
+];
+
+/// What stands for the models where they are not given.
+const BUILT_IN: [SceneSpec; 5] = [
+    scene("engine", "builtin:engine", Some(0.3)),
+    SceneSpec { order: Order::Random, ..scene("cloth", "builtin:cloth", Some(0.4)) },
+    scene("foliage", "builtin:foliage", None),
+    scene("hair", "builtin:hair", None),
+    scene("smoke", "builtin:smoke", None),
+];
+
+/// A design in the comparison: its settings for any count.
+#[derive(Clone, Debug, Serialize)]
+pub struct Contender {
+    /// Name and settings without the count.
+    pub label: String,
+    /// Its family.
+    pub family: Family,
+    /// Whether the count is one of layers too.
+    pub layered: bool,
+    /// The design's name.
+    name: &'static str,
+    settings: Vec<(String, String)>,
+    /// Parameters that follow the count, as (name, times the count).
+    counted: Vec<(&'static str, u32)>,
+    /// Whether it can do without a z-buffer for opaque fragments.
+    opaque_apart: bool,
+}
+
+/// Parameters whose every value makes a contender of its own: they name methods.
+const METHODS: [&str; 4] = ["method", "normalise", "moments", "opacity"];
+
+/// The contenders: every design of the registry with its defaults, and with each of
+/// its methods.
+pub fn contenders() -> Vec<Contender> {
+    let mut list = Vec::new();
+    for entry in DESIGNS.iter().filter(|e| e.info.name != REFERENCE) {
+        list.push(Contender::of(entry, &[]));
+        for param in entry.info.params.iter().filter(|p| METHODS.contains(&p.name)) {
+            let Kind::Choice { options } = param.kind else { continue };
+            for option in options.iter().filter(|o| o.name != param.default) {
+                list.push(Contender::of(entry, &[(param.name, option.name)]));
+            }
+        }
+        if entry.info.params.iter().any(|p| p.name == "mask") {
+            list.push(Contender::of(entry, &[("mask", "naive")]));
+        }
+    }
+    list
+}
+
+impl Contender {
+    fn of(entry: &Entry, settings: &[(&str, &str)]) -> Self {
+        let has = |name: &str| entry.info.params.iter().any(|p| p.name == name);
+        let settings: Vec<(String, String)> =
+            settings.iter().map(|(k, v)| (k.to_string(), v.to_string())).collect();
+        // Wyman's figure 1: twice as many coverage bits as layers.
+        let counted: Vec<(&str, u32)> =
+            [("layers", 1), ("bits", 2)].into_iter().filter(|(name, _)| has(name)).collect();
+        let shown: Vec<String> = settings.iter().map(|(k, v)| format!("{k}={v}")).collect();
+        let separator = if shown.is_empty() { "" } else { ":" };
+        Contender {
+            label: format!("{}{separator}{}", entry.info.name, shown.join(",")),
+            family: entry.info.family,
+            layered: counted.iter().any(|(name, _)| *name == "layers"),
+            name: entry.info.name,
+            settings,
+            counted,
+            opaque_apart: has(crate::rop::over_opaque::PARAM.name),
+        }
+    }
+
+    /// The design for `count` samples or layers, with a z-buffer for opaque fragments
+    /// where the scene has any.
+    fn at(&self, count: u32, has_opaque: bool) -> Result<Configured> {
+        let mut settings = self.settings.clone();
+        let counted = |(name, times): &(&str, u32)| (name.to_string(), (times * count).to_string());
+        settings.extend(self.counted.iter().map(counted));
+        if self.opaque_apart && !has_opaque {
+            settings
+                .push((crate::rop::over_opaque::PARAM.name.to_string(), "together".to_string()));
+        }
+        configure(self.name, &settings)
+    }
+}
+
+/// One contender at one count on one scene.
+#[derive(Clone, Debug, Serialize)]
+pub struct Result1 {
+    /// The contender's place in the list.
+    pub contender: usize,
+    /// Samples, and layers where it has layers.
+    pub count: u32,
+    /// Bytes of state per pixel.
+    pub state_bytes: f64,
+    /// Whether the state grows with the fragments.
+    pub unbounded: bool,
+    /// Passes over the trace.
+    pub passes: u32,
+    /// Errors over the covered pixels against the exact picture of the same samples.
+    pub errors: EnsembleErrors,
+}
+
+impl Result1 {
+    /// Root of the mean square of each pixel's mean error, in 8-bit units: what no
+    /// number of seeds removes.
+    pub fn bias(&self) -> f64 {
+        self.errors.bias_squared.map_or(self.errors.rmse.value, |b| b.max(0.0).sqrt())
+    }
+}
+
+/// One scene with the results of all contenders.
+#[derive(Clone, Debug, Serialize)]
+pub struct ComparedScene {
+    /// A short name.
+    pub name: &'static str,
+    /// The trace in numbers.
+    pub statistics: Statistics,
+    /// Contender after contender, count after count.
+    pub results: Vec<Result1>,
+}
+
+impl ComparedScene {
+    /// A contender's result at a count.
+    pub fn result(&self, contender: usize, count: u32) -> Option<&Result1> {
+        self.results.iter().find(|r| r.contender == contender && r.count == count)
+    }
+
+    /// The least error of a contender with at most `bytes` of state per pixel.
+    pub fn best(&self, contender: usize, bytes: f64) -> Option<&Result1> {
+        let fits =
+            |r: &&Result1| r.contender == contender && !r.unbounded && r.state_bytes <= bytes;
+        self.results
+            .iter()
+            .filter(fits)
+            .min_by(|a, b| a.errors.rmse.value.total_cmp(&b.errors.rmse.value))
+    }
+}
+
+/// The whole comparison.
+#[derive(Clone, Debug, Serialize)]
+pub struct Comparison {
+    /// Frame side in pixels.
+    pub side: u32,
+    /// Seeds of each design that has any.
+    pub seeds: u32,
+    /// Who is compared.
+    pub contenders: Vec<Contender>,
+    /// On what.
+    pub scenes: Vec<ComparedScene>,
+    /// Models that were not given.
+    pub missing: Vec<&'static str>,
+}
+
+/// Compares all designs on the models in a folder, or on built-in scenes where no
+/// folder is given.
+///
+/// # Errors
+/// As [`scene::load`] and [`Configured::replay`].
+pub fn compare(
+    models: Option<&Path>,
+    side: u32,
+    seeds: u32,
+    mut progress: impl FnMut(&str, u64, u64),
+) -> Result<Comparison> {
+    let contenders = contenders();
+    let specs: &[SceneSpec] = if models.is_some() { &MODELS } else { &BUILT_IN };
+    let total = (specs.len() * contenders.len()) as u64;
+    let (mut scenes, mut missing) = (Vec::new(), Vec::new());
+    for (i, spec) in specs.iter().enumerate() {
+        let Some(trace) = spec.capture(models, side)? else {
+            missing.push(spec.source);
+            continue;
+        };
+        let before = (i * contenders.len()) as u64;
+        let watch = |done: usize| progress(spec.name, before + done as u64, total);
+        scenes.push(compared(spec.name, &trace, &contenders, seeds, watch)?);
+    }
+    Ok(Comparison { side, seeds, contenders, scenes, missing })
+}
+
+impl SceneSpec {
+    /// Its trace at 32 samples; `None` where the model is not there.
+    fn capture(&self, models: Option<&Path>, side: u32) -> Result<Option<Trace>> {
+        let in_folder = |file: &str| models.map(|m| m.join(file)).filter(|p| p.is_file());
+        let source = match scene::path_of(self.source) {
+            None => self.source.to_string(),
+            Some(_) => match in_folder(self.source) {
+                Some(path) => path.display().to_string(),
+                None => return Ok(None),
+            },
+        };
+        let mut scene = scene::load(&source)?;
+        if let Some(texture) = self.texture.and_then(in_folder) {
+            scene.apply_texture(&texture)?;
+        }
+        let options = CaptureOptions {
+            width: side,
+            height: side,
+            samples: 32,
+            alpha: self.alpha,
+            faces: Faces::Both,
+            order: self.order,
+            ..CaptureOptions::default()
+        };
+        Ok(Some(Capture::new(&scene, &options)?.to_memory(|_, _| ())?))
+    }
+}
+
+fn compared(
+    name: &'static str,
+    trace: &Trace,
+    contenders: &[Contender],
+    seeds: u32,
+    mut progress: impl FnMut(usize),
+) -> Result<ComparedScene> {
+    let statistics = statistics(trace, |_| ())?;
+    let has_opaque = statistics.alpha.opaque > 0;
+    let options = ReplayOptions { memory: 1 << 30, ..ReplayOptions::default() };
+    let exact = configure(REFERENCE, &[])?;
+    let mut references = Vec::new();
+    for count in COUNTS {
+        let reference = exact.replay(trace, count, 0, &options)?.picture;
+        references.push((count, reference, PixelClasses::of(trace, count)?.covered));
+    }
+    let mut results = Vec::new();
+    for (contender, spec) in contenders.iter().enumerate() {
+        progress(contender);
+        for (count, reference, covered) in &references {
+            let design = spec.at(*count, has_opaque)?;
+            let seeds = if design.promises().seeded { seeds } else { 1 };
+            let mut ensemble = Ensemble::new(reference, &[covered]);
+            let mut passes = 0;
+            for seed in 0..seeds {
+                let replayed = design.replay(trace, *count, seed, &options)?;
+                ensemble.add(&replayed.picture);
+                passes = replayed.passes;
+            }
+            let bits = design.state_bits(&Frame::of(trace, *count, 0)?)?;
+            results.push(Result1 {
+                contender,
+                count: *count,
+                state_bytes: f64::from(bits.total()) / 8.0,
+                unbounded: bits.unbounded,
+                passes,
+                errors: ensemble.finish().swap_remove(0),
+            });
+        }
+    }
+    Ok(ComparedScene { name, statistics, results })
+}
+
+/// Two contenders at equal state over all scenes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Duel {
+    /// Scenes on which the first has the smaller error by more than 2 %.
+    pub won: u32,
+    /// Scenes on which the second has.
+    pub lost: u32,
+    /// Scenes on which neither has.
+    pub even: u32,
+}
+
+impl Comparison {
+    /// Who of two has the smaller error with the same bytes of state: on each scene the
+    /// geometric mean of the errors' ratio over the budgets, which are the state sizes
+    /// of either that both can keep to, each with the best count that fits.
+    pub fn duel(&self, a: usize, b: usize) -> Duel {
+        let mut duel = Duel::default();
+        for scene in &self.scenes {
+            let of_either = scene.results.iter().filter(|r| [a, b].contains(&r.contender));
+            let logs: Vec<f64> = of_either
+                .filter_map(|r| {
+                    let error = |c| scene.best(c, r.state_bytes).map(|r| r.errors.rmse.value);
+                    // Errors below this are rounding.
+                    Some((error(a)?.max(1e-3) / error(b)?.max(1e-3)).ln())
+                })
+                .collect();
+            if logs.is_empty() {
+                continue;
+            }
+            let ratio = (logs.iter().sum::<f64>() / logs.len() as f64).exp();
+            if ratio < 0.98 {
+                duel.won += 1;
+            } else if ratio > 1.0 / 0.98 {
+                duel.lost += 1;
+            } else {
+                duel.even += 1;
+            }
+        }
+        duel
+    }
+
+    /// The contender with a label.
+    pub fn contender(&self, label: &str) -> Option<usize> {
+        self.contenders.iter().position(|c| c.label == label)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_design_is_a_contender_and_all_settings_resolve() {
+        let list = contenders();
+        for entry in DESIGNS.iter().filter(|e| e.info.name != REFERENCE) {
+            assert!(list.iter().any(|c| c.label == entry.info.name));
+        }
+        for contender in &list {
+            for count in COUNTS {
+                for has_opaque in [true, false] {
+                    contender.at(count, has_opaque).unwrap();
+                }
+            }
+        }
+        assert!(list.len() > DESIGNS.len());
+        assert!(Family::ALL.len() > 2);
+    }
+}
