@@ -7,7 +7,7 @@ use crate::random::hash;
 use crate::resolve::box_filter;
 use crate::rop::{
     Blueprint, Contents, Design, Family, Frame, Info, OrderPromise, Probe, Promises, Samples, Site,
-    StateBits, Threshold, depth_bits,
+    StateBits, Threshold, depth_bits, random_subset,
 };
 use crate::trace::{Fragment, SampleMask, Unorm32};
 
@@ -116,14 +116,7 @@ impl<const N: usize> EndertonAt<N> {
                 probe.hashed(1 + from.count());
                 // ξ is one word further than the samples'.
                 let count = opacity.of_many(from.count(), word(N as u32));
-                // A random subset: the samples with the smallest of as many words.
-                let mut keyed = [(0_u32, 0_u8); N];
-                let n = from.count() as usize;
-                for (slot, s) in keyed.iter_mut().zip(from.iter()) {
-                    *slot = (word(s as u32), s as u8);
-                }
-                keyed[..n].sort_unstable();
-                keyed[..count as usize].iter().map(|(_, s)| usize::from(*s)).collect()
+                random_subset(from, count, word)
             }
         }
     }

@@ -1,14 +1,28 @@
 //! The designs, one file each, and their registry.
 
+mod abuffer;
+mod adaptive;
+mod depth_peeling;
 mod enderton;
 mod exact;
+mod hybrid;
+mod kbuffer;
 mod lk;
+mod mlab;
+mod slab;
 
 use std::fmt;
 
+pub use abuffer::ABuffer;
+pub use adaptive::Adaptive;
+pub use depth_peeling::DepthPeeling;
 pub use enderton::Enderton;
 pub use exact::Exact;
+pub use hybrid::Hybrid;
+pub use kbuffer::KBuffer;
 pub use lk::LaineKarras;
+pub use mlab::Mlab;
+pub use slab::Slab;
 
 use crate::error::{Error, Result};
 use crate::param::{Values, parse_spec};
@@ -20,8 +34,18 @@ use crate::rop::{
 use crate::trace::Trace;
 
 /// All designs.
-pub const DESIGNS: &[Entry] =
-    &[Entry::of::<Exact>(), Entry::of::<LaineKarras>(), Entry::of::<Enderton>()];
+pub const DESIGNS: &[Entry] = &[
+    Entry::of::<Exact>(),
+    Entry::of::<LaineKarras>(),
+    Entry::of::<Enderton>(),
+    Entry::of::<Slab>(),
+    Entry::of::<KBuffer>(),
+    Entry::of::<ABuffer>(),
+    Entry::of::<Mlab>(),
+    Entry::of::<Hybrid>(),
+    Entry::of::<Adaptive>(),
+    Entry::of::<DepthPeeling>(),
+];
 
 /// The name of the design that others are measured against.
 pub const REFERENCE: &str = Exact::INFO.name;
