@@ -34,7 +34,7 @@ use crate::rop::{
 use crate::trace::Trace;
 
 /// All designs.
-pub const DESIGNS: &[Entry] = &[
+pub static DESIGNS: &[Entry] = &[
     Entry::of::<Exact>(),
     Entry::of::<LaineKarras>(),
     Entry::of::<Enderton>(),

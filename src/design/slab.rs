@@ -25,8 +25,8 @@
 //!   whole pixels and come near to far: the bits are those of its samples. In other
 //!   orders, layers that nearer ones have come to hide still take room, and visible
 //!   ones are dropped for them; `hidden=removed` makes it true in every order. With
-//!   continuous opacity b = n shares but the probability of a fragment that finds
-//!   one nearer layer.
+//!   continuous opacity the second fragment, near to far, enters as likely as
+//!   stochastic transparency would show it; then it shows all of its alpha.
 //! - *b without bound* (`bits=0`) is the k-buffer, bit for bit.
 //! - Layers are ordered as at the pixel's centre. Where no two cross within a pixel,
 //!   `normalise=none` is unbiased for discrete opacity with as many layers as bits
@@ -127,7 +127,7 @@ impl Blueprint for Slab {
 
     fn promises(values: &Values) -> Promises {
         let bits = values.integer("bits");
-        // Visible layers at a single column are never more than bits: none is dropped
+        // Visible layers in a single column are never more than bits: none is dropped
         // that would be seen.
         let complete = values.choice::<Opacity>("opacity") == Opacity::Discrete
             && values.choice::<Hidden>("hidden") == Hidden::Removed
@@ -138,7 +138,9 @@ impl Blueprint for Slab {
             unbiased: false,
             // Samples of a pixel share their bits.
             consistent: false,
-            order: match (bits == 0 || complete, unsummed) {
+            // What finds no layer before it enters whatever came earlier, and where there
+            // is room for one alone, the nearest such stays.
+            order: match (bits == 0 || complete || values.integer(LAYERS.name) == 1, unsummed) {
                 (true, true) => OrderPromise::Independent,
                 (true, false) => OrderPromise::UpToRounding,
                 (false, _) => OrderPromise::Dependent,

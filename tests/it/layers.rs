@@ -168,7 +168,8 @@ fn what_is_unbiased_in_slab_where_no_layers_cross() {
             ("slab:normalise=none,bits=8,layers=24,weigh=true,insertion=independent".into(), true),
             // As published, alpha is lost with what does not enter.
             ("slab:normalise=none,bits=8,layers=24".into(), false),
-            // By depth: the sum is unbiased, but what lies behind shows between layers.
+            // Bits also tell visibility without bias, alphas that did not enter do not:
+            // everything behind them is too bright.
             (format!("{DISCRETE},layers=8,hidden=removed").replace("none", "depth"), true),
             ("slab:normalise=depth,bits=8,layers=24".into(), false),
             ("slab:normalise=alpha,bits=8,layers=24".into(), false),
@@ -176,7 +177,6 @@ fn what_is_unbiased_in_slab_where_no_layers_cross() {
         ] {
             let (value, errors) = bias(&spec, trace, 4, 200);
             // 33 tests: 5 standard errors leave 2e-5 for all.
-            println!("{spec}: {value:+.3}, {errors:.1} standard errors");
             assert_eq!(errors < 5.0, unbiased, "{spec}: {value:+.3}, {errors:.1}");
         }
     }
@@ -216,6 +216,6 @@ fn masks_keep_apart_what_shares_mix() {
         // 0 and 0.5 side by side.
         assert_eq!(red(&format!("{name}:opaque=together")), 0.25, "{name}");
     }
-    // Half of 0.5 before half of 0 before half of white's rest.
+    // Half of 0.5, before half of 0, before all of white.
     assert_eq!(red("kbuffer:opaque=together,coverage=share"), 0.25 + 0.25);
 }
