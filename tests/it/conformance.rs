@@ -198,13 +198,17 @@ fn distinct_depths(samples: u32) -> (screendoor::trace::Header, Vec<Fragment>) {
 /// Errors of this size, in 8-bit units, are those of sums in single precision.
 const ROUNDING: f64 = 1e-3;
 
-/// Distinct depths in few pixels, so faint that more layers can be seen than anyone
-/// keeps.
+/// Distinct depths in few pixels, most so faint that more layers can be seen than
+/// anyone keeps, and a few that hide what lies behind them.
 fn crowded_depths(samples: u32) -> (screendoor::trace::Header, Vec<Fragment>) {
     let (_, mut fragments) = distinct_depths(samples);
-    for f in &mut fragments {
+    for (i, f) in fragments.iter_mut().enumerate() {
         (f.x, f.y) = (f.x % 4, f.y % 4);
-        f.alpha *= 0.1;
+        if i % 16 == 0 {
+            f.coverage = SampleMask::first(samples);
+        } else {
+            f.alpha *= 0.1;
+        }
     }
     (header(4, 4, samples), fragments)
 }
