@@ -8,7 +8,7 @@ use crate::random::hash;
 use crate::rop::stochastic::{self, COMBINATIONS, METHOD, OPAQUE, ROUNDS, STRATA};
 use crate::rop::{
     Blueprint, Dither, Family, Frame, Info, OrderPromise, PixelOrder, Probe, Promises, Reference,
-    ReferenceKey, Round, Sampler, Site, Stochastic, Threshold, depth_bits,
+    ReferenceKey, Round, Sampler, Site, Stochastic, Threshold, depth_bits, random_subset,
 };
 use crate::tile::TileGrid;
 use crate::trace::{Fragment, MAX_SAMPLES, SampleMask, Unorm32};
@@ -166,6 +166,9 @@ impl<const N: usize> EndertonSampler<N> {
     /// `⌊α·n + ξ⌋` of the `n` slots at random: those with the smallest of as many
     /// words; those of the round, as samples.
     fn subset(round: Round, from: SampleMask, count: u32, word: impl Fn(u32) -> u32) -> SampleMask {
+        if round.count == 1 {
+            return random_subset(from, count, word);
+        }
         let mut keyed: ArrayVec<(u32, u16), MAX_SLOTS> = ArrayVec::new();
         for r in 0..round.count {
             keyed.extend(from.iter().map(|s| {

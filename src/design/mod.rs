@@ -1,19 +1,33 @@
 //! The designs, one file each, and their registry.
 
+mod abuffer;
+mod adaptive;
 mod alpha_to_coverage;
+mod depth_peeling;
 mod enderton;
 mod exact;
 mod hashed_alpha;
+mod hybrid;
+mod kbuffer;
 mod lk;
+mod mlab;
+mod slab;
 mod systematic;
 
 use std::fmt;
 
+pub use abuffer::ABuffer;
+pub use adaptive::Adaptive;
 pub use alpha_to_coverage::AlphaToCoverage;
+pub use depth_peeling::DepthPeeling;
 pub use enderton::Enderton;
 pub use exact::Exact;
 pub use hashed_alpha::HashedAlpha;
+pub use hybrid::Hybrid;
+pub use kbuffer::KBuffer;
 pub use lk::LaineKarras;
+pub use mlab::Mlab;
+pub use slab::Slab;
 pub use systematic::Systematic;
 
 use crate::error::{Error, Result};
@@ -32,6 +46,13 @@ pub static DESIGNS: &[Entry] = &[
     Entry::of::<Enderton>(),
     Entry::of::<HashedAlpha>(),
     Entry::of::<AlphaToCoverage>(),
+    Entry::of::<Slab>(),
+    Entry::of::<KBuffer>(),
+    Entry::of::<ABuffer>(),
+    Entry::of::<Mlab>(),
+    Entry::of::<Hybrid>(),
+    Entry::of::<Adaptive>(),
+    Entry::of::<DepthPeeling>(),
 ];
 
 /// The name of the design that others are measured against.

@@ -158,7 +158,8 @@ pub struct Promises {
     /// What the order does in which fragments of different depths arrive.
     pub order: OrderPromise,
     /// However opaque fragments share pixels and depths, their picture is the exact one.
-    /// (That of opaque fragments at different depths that cover whole pixels always is.)
+    /// (That of opaque fragments at different depths that cover whole pixels always is,
+    /// unless the design is told to forgo the z-buffer that holds them.)
     pub exact_opaque: bool,
     /// The picture depends on the seed.
     pub seeded: bool,

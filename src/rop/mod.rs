@@ -5,6 +5,8 @@ pub mod depth_bits;
 mod design;
 mod dither;
 mod event;
+pub mod layers;
+mod normalise;
 mod opacity;
 pub mod over_opaque;
 mod pixel_order;
@@ -12,6 +14,7 @@ mod reference_value;
 mod replay;
 mod samples;
 pub mod stochastic;
+mod subset;
 mod surface;
 pub mod tracked;
 
@@ -20,6 +23,7 @@ pub use design::{
 };
 pub use dither::{BAYER, BLUE_NOISE, Dither, Ranks, TILE};
 pub use event::{EventCounts, NoProbe, Probe, Record, ReferenceRecord};
+pub use normalise::{Normalise, Sums};
 pub use opacity::Threshold;
 pub use over_opaque::{Opaque, OverOpaque, Transparent};
 pub use pixel_order::{PixelIndex, PixelOrder};
@@ -30,4 +34,5 @@ pub use replay::{
 };
 pub use samples::{SampleContents, SampleList, Samples, in_sample_order, sort_by_stored_depth};
 pub use stochastic::{Round, Sampler, Stochastic};
+pub use subset::{random_subset, visible_independent, visible_stratified};
 pub use surface::{CoveredMask, SurfaceRule, SurfaceTracker, Tracked};

@@ -109,6 +109,23 @@ fn state_per_pixel() {
         ("lk:depth-bits=24", 288, 36),
         ("enderton", 320, 0),
         ("enderton:depth-bits=16", 256, 0),
+        // Layers of a depth, a mask, a colour and an alpha beside the opaque samples.
+        ("kbuffer", 320, 8 * (32 + 4 + 48 + 32)),
+        ("kbuffer:coverage=share,opaque=together,layers=2", 0, 2 * (32 + 48 + 32)),
+        ("mlab", 320, 8 * 116),
+        ("abuffer", 320, 8 * 116 + 4),
+        ("abuffer:overflow=blend", 320, 8 * 116 + 4 + 4 * 80),
+        // Three sums of colour, one of alpha, a count.
+        ("hybrid", 320, 8 * 116 + 5 * 32),
+        // Nodes have no colour; its sum has three parts.
+        ("adaptive", 320, 8 * (32 + 4 + 32) + 3 * 32),
+        // Two depths, colours and alphas a sample, and where asked numbers.
+        ("depth-peeling", 320, 4 * 2 * (32 + 48 + 32)),
+        ("depth-peeling:ties=kept", 320, 4 * 2 * (64 + 48 + 32) + 32),
+        ("slab:normalise=none", 320, 8 * 116),
+        ("slab:normalise=none,opacity=discrete", 320, 8 * (32 + 4 + 48 + 16)),
+        // A transmittance a sample, a colour, an alpha.
+        ("slab", 320, 8 * 116 + 4 * 32 + 3 * 32 + 32),
     ] {
         let expected = StateBits { samples, extra, unbounded: false };
         assert_eq!(design(spec).state_bits(&frame).unwrap(), expected, "{spec}");

@@ -8,6 +8,7 @@ mod guarantees;
 mod hostile;
 mod large;
 mod layering;
+mod layers;
 mod loaders;
 mod models;
 mod python;

@@ -58,6 +58,12 @@ fn cases(samples: u32) -> Vec<Case> {
     // White surfaces in pieces, in random order.
     cases.push(("pieces", header.clone(), interleaved_pieces(&header)));
     cases.push(("torn", header.clone(), torn_primitive(&header)));
+    // Two layers that cross within each pixel.
+    let mut crossing = layered(&header, 2, |i| (1 << 31, colour(i), 0.5));
+    for f in &mut crossing {
+        f.depth.dzdx = if f.primitive == 0 { 1 << 28 } else { -(1 << 28) };
+    }
+    cases.push(("crossing", header.clone(), crossing));
     cases
 }
 

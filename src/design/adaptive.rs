@@ -1,0 +1,198 @@
+//! Adaptive transparency (Salvi, Montgomery, Lefohn, HPG 2011): a first pass builds
+//! each pixel's visibility over depth as a staircase of few nodes, removing the
+//! node whose removal changes the area under it least; a second pass adds up
+//! `Σ α c vis(z)` in whatever order fragments come.
+//!
+//! As in the authors' public shader: a removed node's step is taken by the node
+//! before it, so that visibility is underestimated in between and total
+//! transmittance is kept; the first and the last node are never removed; what lies
+//! at equal depths does not hide each other.
+//!
+//! Where nodes cover different samples, the area is that under the pixel's mean
+//! visibility, and a removed node's samples are joined to those of the node before
+//! it, over which their transmittance is averaged.
+
+use crate::error::Result;
+use crate::param::Values;
+use crate::rop::layers::{
+    COVERAGE, Columns, LAYERS, Layer, composite, contents, insert, nearer, room,
+};
+use crate::rop::{
+    Blueprint, Contents, Family, Frame, Info, Opaque, OrderPromise, OverOpaque, Probe, Promises,
+    Site, StateBits, Transparent, over_opaque,
+};
+use crate::trace::Fragment;
+
+/// The design's entry in the registry.
+pub struct Adaptive;
+
+impl Blueprint for Adaptive {
+    const INFO: Info = Info {
+        name: "adaptive",
+        family: Family::Layered,
+        summary: "visibility over depth in few nodes, then a sum of all fragments by it",
+        citation: "Salvi, Montgomery, Lefohn: Adaptive Transparency, HPG 2011",
+        params: &[over_opaque::PARAM, LAYERS, COVERAGE],
+        combinations: &[],
+    };
+
+    type At<const N: usize> = OverOpaque<AdaptiveAt<N>, N>;
+
+    fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
+        let columns = Columns::of(values);
+        // A node is a depth, a mask and a transmittance.
+        let inner =
+            AdaptiveAt { columns, nodes: room(values), bits: 32 + columns.mask_bits() + 32 };
+        Ok(OverOpaque::new(frame, over_opaque::of(values), inner))
+    }
+
+    fn promises(values: &Values) -> Promises {
+        Promises {
+            unbiased: false,
+            consistent: false,
+            // Which nodes are removed depends on what has come so far.
+            order: OrderPromise::Dependent,
+            exact_opaque: over_opaque::of(values) == Opaque::First,
+            seeded: false,
+        }
+    }
+}
+
+/// The design for pixels of `N` samples.
+#[derive(Clone, Debug)]
+pub struct AdaptiveAt<const N: usize> {
+    columns: Columns<N>,
+    nodes: usize,
+    bits: u32,
+}
+
+/// A pixel.
+#[derive(Clone, Debug, Default)]
+pub struct AdaptivePixel {
+    /// The nodes from near to far: layers without colour.
+    nodes: Vec<Layer>,
+    /// `Σ α c vis(z)` over fragments and the columns that they cover.
+    colour: [f32; 3],
+}
+
+impl<const N: usize> AdaptiveAt<N> {
+    /// The sum of the pixel's columns.
+    const COLOUR_BITS: u32 = 3 * 32;
+
+    /// Removes the node whose removal changes the area least. Areas are compared as
+    /// integers.
+    fn remove_least(&self, nodes: &mut Vec<Layer>) {
+        // All but the first and the last; of two nodes, the second.
+        let end = (nodes.len() - 1).max(2);
+        let mut passes = [1.0_f32; N];
+        let mut visibility = |node: &Layer| {
+            node.coverage.iter().for_each(|s| passes[s] *= node.transmittance);
+            let columns = &passes[..self.columns.count()];
+            let mean = columns.iter().sum::<f32>() / columns.len() as f32;
+            (f64::from(mean) * 4_294_967_296.0) as u64
+        };
+        let mut before = visibility(&nodes[0]);
+        let mut least = (u128::MAX, 1);
+        for i in 1..end {
+            let after = visibility(&nodes[i]);
+            let step = u128::from(before.saturating_sub(after));
+            let area = u128::from(nodes[i].depth.0 - nodes[i - 1].depth.0) * step;
+            if area < least.0 {
+                least = (area, i);
+            }
+            before = after;
+        }
+        let removed = nodes.remove(least.1);
+        nodes[least.1 - 1] = nodes[least.1 - 1].merged(&removed);
+    }
+}
+
+impl<const N: usize> Transparent<N> for AdaptiveAt<N> {
+    type Pixel = AdaptivePixel;
+
+    fn passes(&self) -> u32 {
+        2
+    }
+
+    fn state_bits(&self) -> StateBits {
+        let extra = self.nodes as u32 * self.bits + Self::COLOUR_BITS;
+        StateBits { samples: 0, extra, unbounded: false }
+    }
+
+    fn clear(&self, _site: Site) -> AdaptivePixel {
+        AdaptivePixel::default()
+    }
+
+    fn draw<P: Probe>(
+        &self,
+        pass: u32,
+        _site: Site,
+        pixel: &mut AdaptivePixel,
+        fragment: &Fragment,
+        probe: &mut P,
+    ) {
+        let layer = self.columns.layer(fragment);
+        probe.written(fragment.coverage);
+        if pass == 0 {
+            let node = Layer { colour: [0.0; 3], ..layer };
+            insert(&mut pixel.nodes, self.nodes + 1, node, self.bits, probe);
+            if pixel.nodes.len() > self.nodes {
+                self.remove_least(&mut pixel.nodes);
+                // All are read; those from the removed one on move back.
+                let bits = self.bits * self.nodes as u32;
+                probe.state(bits, bits);
+            }
+            return;
+        }
+        let nearer = &pixel.nodes[..nearer(&pixel.nodes, layer.depth)];
+        let visible: f64 = layer.coverage.iter().map(|s| composite(nearer, s).1).sum();
+        for (sum, c) in pixel.colour.iter_mut().zip(layer.colour) {
+            *sum += c * visible as f32;
+        }
+        probe.state(self.bits * pixel.nodes.len() as u32 + Self::COLOUR_BITS, Self::COLOUR_BITS);
+    }
+
+    fn resolve(&self, _site: Site, pixel: &AdaptivePixel, behind: &[[f32; 3]; N]) -> [f64; 3] {
+        let count = self.columns.count() as f64;
+        let behind = self.columns.over(behind, |column| composite(&pixel.nodes, column));
+        std::array::from_fn(|i| f64::from(pixel.colour[i]) / count + behind[i])
+    }
+
+    fn contents(&self, pixel: &AdaptivePixel) -> Contents {
+        let mut contents = contents(&pixel.nodes);
+        contents.fields[0].0 = "nodes";
+        let colour = pixel.colour.map(|c| format!("{c:.3}")).join(" ");
+        contents.fields.push(("sum", colour));
+        contents
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::design::configure;
+    use crate::trace::{SampleMask, Unorm32};
+
+    #[test]
+    fn the_least_area_goes_and_the_node_before_takes_its_step() {
+        let design = configure("adaptive", &[]).unwrap();
+        let design = AdaptiveAt::<1> { columns: Columns::of(design.values()), nodes: 3, bits: 65 };
+        let node = |depth, transmittance| Layer {
+            depth: Unorm32(depth),
+            coverage: SampleMask(1),
+            colour: [0.0; 3],
+            transmittance,
+        };
+        // Steps from visibility 0.5 on: 0.25 over 100, 0.125 over 100; the last stays.
+        let mut nodes = vec![node(0, 0.5), node(100, 0.5), node(200, 0.5), node(201, 0.9)];
+        design.remove_least(&mut nodes);
+        assert_eq!(nodes, [node(0, 0.5), node(100, 0.25), node(201, 0.9)]);
+        // 0.25 over 10 is less than 0.125 over 90.
+        let mut nodes = vec![node(0, 0.5), node(10, 0.5), node(100, 0.5), node(201, 0.9)];
+        design.remove_least(&mut nodes);
+        assert_eq!(nodes, [node(0, 0.25), node(100, 0.5), node(201, 0.9)]);
+        let mut nodes = vec![node(0, 0.5), node(10, 0.5)];
+        design.remove_least(&mut nodes);
+        assert_eq!(nodes, [node(0, 0.25)]);
+    }
+}

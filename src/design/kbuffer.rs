@@ -1,0 +1,83 @@
+//! The k-buffer (Bavoil, Callahan, Lefohn, Comba, Silva, I3D 2007): the nearest
+//! layers are kept in the order of their depths, what lies behind them is dropped.
+
+use crate::error::Result;
+use crate::param::Values;
+use crate::rop::layers::{COVERAGE, LAYERS, Layer, Layering, contents};
+use crate::rop::{
+    Blueprint, Contents, Family, Frame, Info, Opaque, OrderPromise, OverOpaque, Probe, Promises,
+    Site, StateBits, Transparent, over_opaque,
+};
+use crate::trace::Fragment;
+
+/// The design's entry in the registry.
+pub struct KBuffer;
+
+impl Blueprint for KBuffer {
+    const INFO: Info = Info {
+        name: "kbuffer",
+        family: Family::Layered,
+        summary: "the nearest layers, sorted; what lies behind them is dropped",
+        citation: "Bavoil, Callahan, Lefohn, Comba, Silva: Multi-Fragment Effects on the GPU using the k-Buffer, I3D 2007",
+        params: &[over_opaque::PARAM, LAYERS, COVERAGE],
+        combinations: &[],
+    };
+
+    type At<const N: usize> = OverOpaque<KBufferAt<N>, N>;
+
+    fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
+        let inner = KBufferAt(Layering::of(values, frame));
+        Ok(OverOpaque::new(frame, over_opaque::of(values), inner))
+    }
+
+    fn promises(values: &Values) -> Promises {
+        Promises {
+            // What is dropped is missing; and layers that cross within a pixel are
+            // ordered as at its centre.
+            unbiased: false,
+            consistent: false,
+            order: OrderPromise::Independent,
+            exact_opaque: over_opaque::of(values) == Opaque::First,
+            seeded: false,
+        }
+    }
+}
+
+/// The design for pixels of `N` samples.
+#[derive(Clone, Debug)]
+pub struct KBufferAt<const N: usize>(Layering<N>);
+
+impl<const N: usize> Transparent<N> for KBufferAt<N> {
+    /// The layers from near to far.
+    type Pixel = Vec<Layer>;
+
+    fn state_bits(&self) -> StateBits {
+        self.0.state_bits(0)
+    }
+
+    fn clear(&self, _site: Site) -> Vec<Layer> {
+        Vec::new()
+    }
+
+    fn draw<P: Probe>(
+        &self,
+        _pass: u32,
+        _site: Site,
+        layers: &mut Vec<Layer>,
+        fragment: &Fragment,
+        probe: &mut P,
+    ) {
+        let layer = self.0.columns.layer(fragment);
+        if self.0.insert(layers, layer, probe) != Some(layer) {
+            probe.written(fragment.coverage);
+        }
+    }
+
+    fn resolve(&self, _site: Site, layers: &Vec<Layer>, behind: &[[f32; 3]; N]) -> [f64; 3] {
+        self.0.resolve(layers, behind)
+    }
+
+    fn contents(&self, layers: &Vec<Layer>) -> Contents {
+        contents(layers)
+    }
+}
