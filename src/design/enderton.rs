@@ -6,8 +6,8 @@ use crate::param::{Param, Values};
 use crate::random::hash;
 use crate::resolve::box_filter;
 use crate::rop::{
-    Blueprint, Contents, Design, Family, Frame, Info, OrderPromise, Probe, Promises, Samples, Site,
-    StateBits, Threshold, depth_bits,
+    Blueprint, Contents, Design, Family, Frame, Info, OpaquePromise, OrderPromise, Probe, Promises,
+    Samples, Site, StateBits, Threshold, depth_bits,
 };
 use crate::trace::{Fragment, SampleMask, Unorm32};
 
@@ -69,7 +69,7 @@ impl Blueprint for Enderton {
             } else {
                 OrderPromise::Dependent
             },
-            exact_opaque: true,
+            exact_opaque: OpaquePromise::Always,
             seeded: true,
         }
     }

@@ -8,9 +8,10 @@ use crate::error::Result;
 use crate::param::{Param, Values};
 use crate::resolve::box_filter;
 use crate::rop::{
-    Blueprint, Contents, Design, Family, Frame, Info, OrderPromise, PixelIndex, PixelOrder, Probe,
-    Promises, Reference, ReferenceKey, SampleList, Samples, Site, StateBits, SurfaceRule,
-    SurfaceTracker, Threshold, Tracked, depth_bits, in_sample_order, sort_by_stored_depth,
+    Blueprint, Contents, Design, Family, Frame, Info, OpaquePromise, OrderPromise, PixelIndex,
+    PixelOrder, Probe, Promises, Reference, ReferenceKey, SampleList, Samples, Site, StateBits,
+    SurfaceRule, SurfaceTracker, Threshold, Tracked, depth_bits, in_sample_order,
+    sort_by_stored_depth,
 };
 use crate::trace::{Fragment, SampleMask, Unorm32};
 
@@ -97,7 +98,7 @@ impl Blueprint for LaineKarras {
             // its samples are numbered in a row.
             consistent: apart && (scrambled || (values.flag("compact") && values.flag("sort"))),
             order: OrderPromise::Dependent,
-            exact_opaque: true,
+            exact_opaque: OpaquePromise::Always,
             seeded: true,
         }
     }

@@ -1,14 +1,22 @@
 //! The designs, one file each, and their registry.
 
+mod blend;
 mod enderton;
 mod exact;
 mod lk;
+mod mboit;
+mod sorted_blend;
+mod wboit;
 
 use std::fmt;
 
+pub use blend::Blend;
 pub use enderton::Enderton;
 pub use exact::Exact;
 pub use lk::LaineKarras;
+pub use mboit::MomentBased;
+pub use sorted_blend::SortedBlend;
+pub use wboit::WeightedBlended;
 
 use crate::error::{Error, Result};
 use crate::param::{Values, parse_spec};
@@ -20,8 +28,15 @@ use crate::rop::{
 use crate::trace::Trace;
 
 /// All designs.
-pub const DESIGNS: &[Entry] =
-    &[Entry::of::<Exact>(), Entry::of::<LaineKarras>(), Entry::of::<Enderton>()];
+pub const DESIGNS: &[Entry] = &[
+    Entry::of::<Exact>(),
+    Entry::of::<LaineKarras>(),
+    Entry::of::<Enderton>(),
+    Entry::of::<Blend>(),
+    Entry::of::<SortedBlend>(),
+    Entry::of::<WeightedBlended>(),
+    Entry::of::<MomentBased>(),
+];
 
 /// The name of the design that others are measured against.
 pub const REFERENCE: &str = Exact::INFO.name;
@@ -68,7 +83,7 @@ impl Entry {
             trace: &Trace,
             options: &ReplayOptions<'_>,
         ) -> Result<Replayed> {
-            replay(&B::at::<N>(values, frame)?, frame, trace, options)
+            replay(&B::at::<N>(values, &frame.prepared::<B>(trace)?)?, frame, trace, options)
         }
         fn explain_at<B: Blueprint, const N: usize>(
             values: &Values,
@@ -77,7 +92,8 @@ impl Entry {
             site: Site,
             progress: &dyn Fn(u64, u64),
         ) -> Result<Explanation> {
-            explain(&B::at::<N>(values, frame)?, frame, trace, site, progress)
+            let design = B::at::<N>(values, &frame.prepared::<B>(trace)?)?;
+            explain(&design, frame, trace, site, progress)
         }
         fn state_bits_at<B: Blueprint, const N: usize>(
             values: &Values,

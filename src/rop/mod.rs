@@ -1,25 +1,36 @@
 //! What the raster-operations units share: pixel state, surface tracking, sample
 //! order, reference values, event counts, and the replay.
 
+pub mod accumulators;
+mod blend_buffer;
 pub mod depth_bits;
 mod design;
 mod event;
+mod moments;
 mod opacity;
 pub mod over_opaque;
 mod pixel_order;
+mod primitive_depths;
 mod reference_value;
 mod replay;
 mod samples;
 mod surface;
+pub mod view_depth;
 
+pub use accumulators::{Accumulators, Coverage};
+pub use blend_buffer::BlendBuffer;
 pub use design::{
-    Blueprint, Contents, Design, Family, Frame, Info, OrderPromise, Promises, Site, StateBits,
+    Blueprint, Contents, Design, Family, Frame, Info, OpaquePromise, OrderPromise, Promises, Site,
+    StateBits,
 };
 pub use event::{EventCounts, NoProbe, Probe, Record, ReferenceRecord};
+pub use moments::{MomentCount, Moments};
 pub use opacity::Threshold;
 pub use over_opaque::{Opaque, OverOpaque, Transparent};
 pub use pixel_order::{PixelIndex, PixelOrder};
+pub use primitive_depths::PrimitiveDepths;
 pub use reference_value::{Reference, ReferenceKey, scramble_lk2011};
 pub use replay::{Explanation, ReplayOptions, Replayed, Step, draw_pixel, explain, replay};
 pub use samples::{SampleContents, SampleList, Samples, in_sample_order, sort_by_stored_depth};
 pub use surface::{CoveredMask, SurfaceRule, SurfaceTracker, Tracked};
+pub use view_depth::ViewDepth;
