@@ -26,7 +26,7 @@ impl Blueprint for MomentBased {
             Param::real(
                 "bias",
                 "1",
-                (0.0, 1000.0),
+                (0.1, 10.0),
                 "how far moments are drawn towards those of a fixed measure, in units of the \
                  supplement's 5e-7, 5e-6, 5e-5 for 4, 6, 8 moments",
             ),
@@ -42,7 +42,7 @@ impl Blueprint for MomentBased {
             accumulators::PARAM,
             over_opaque::PARAM,
         ],
-        combinations: &["moments=8,coverage=share", "moments=8,bias=0"],
+        combinations: &["moments=8,coverage=share", "moments=8,bias=0.1"],
     };
 
     type At<const N: usize> = OverOpaque<MomentBasedAt<N>, N>;
@@ -62,7 +62,9 @@ impl Blueprint for MomentBased {
         Promises {
             unbiased: false,
             consistent: false,
-            order: OrderPromise::UpToRounding,
+            // How much a reconstruction differs with the moments' rounding grows as their
+            // matrix nears a singular one; only the bias bounds it.
+            order: OrderPromise::AmplifiedRounding,
             exact_opaque: OpaquePromise::where_first(values),
             seeded: false,
         }

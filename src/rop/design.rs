@@ -186,6 +186,7 @@ impl Promises {
         let order = match self.order {
             OrderPromise::Independent => "independent of order",
             OrderPromise::UpToRounding => "independent of order up to rounding",
+            OrderPromise::AmplifiedRounding => "independent of order up to amplified rounding",
             OrderPromise::Dependent => "",
         };
         let opaque = match self.exact_opaque {
@@ -212,6 +213,9 @@ pub enum OrderPromise {
     Independent,
     /// It changes in which order sums are rounded and nothing else.
     UpToRounding,
+    /// So does this; but what the design makes of its sums amplifies their rounding,
+    /// where depths lie close together until it shows.
+    AmplifiedRounding,
     /// It changes the picture.
     Dependent,
 }

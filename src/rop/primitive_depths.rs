@@ -41,8 +41,6 @@ impl PrimitiveDepths {
                 sum.samples += u64::from(samples);
             }
         }
-        // In place of the sums, primitive by primitive, would save their memory for the
-        // time of this line; a hash table cannot change its values' type.
         let mean = |sum: Sum| ((sum.depth << 32) / u128::from(sum.samples.max(1))) as u64;
         Ok(PrimitiveDepths { means: sums.into_iter().map(|(p, sum)| (p, mean(sum))).collect() })
     }

@@ -16,7 +16,8 @@ crate::options! {
     }
 }
 
-/// Where the near plane stands.
+/// Where the near plane stands. By default the far plane stands twice as far, about as
+/// in a view that frames a scene with a common field of view.
 pub const NEAR: Param = Param::real("near", "10", (1e-3, 1e6), "view depth of the near plane");
 /// How far it is from there to the far plane.
 pub const RANGE: Param =
