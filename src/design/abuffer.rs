@@ -6,8 +6,8 @@ use crate::error::Result;
 use crate::param::{Param, Values};
 use crate::rop::layers::{COVERAGE, LAYERS, Layer, Layering, composite, contents};
 use crate::rop::{
-    Blueprint, Contents, Family, Frame, Info, Opaque, OrderPromise, OverOpaque, Probe, Promises,
-    Site, StateBits, Transparent, over_opaque,
+    Blueprint, Contents, Family, Frame, Info, OpaquePromise, OrderPromise, OverOpaque, Probe,
+    Promises, Site, StateBits, Transparent, over_opaque,
 };
 use crate::trace::Fragment;
 
@@ -58,7 +58,7 @@ impl Blueprint for ABuffer {
                 Overflow::Furthest => OrderPromise::Independent,
                 Overflow::Newest | Overflow::Blend => OrderPromise::Dependent,
             },
-            exact_opaque: over_opaque::of(values) == Opaque::First,
+            exact_opaque: OpaquePromise::where_first(values),
             seeded: false,
         }
     }

@@ -18,8 +18,8 @@ use crate::rop::layers::{
     COVERAGE, Columns, LAYERS, Layer, composite, contents, insert, nearer, room,
 };
 use crate::rop::{
-    Blueprint, Contents, Family, Frame, Info, Opaque, OrderPromise, OverOpaque, Probe, Promises,
-    Site, StateBits, Transparent, over_opaque,
+    Blueprint, Contents, Family, Frame, Info, OpaquePromise, OrderPromise, OverOpaque, Probe,
+    Promises, Site, StateBits, Transparent, over_opaque,
 };
 use crate::trace::Fragment;
 
@@ -52,7 +52,7 @@ impl Blueprint for Adaptive {
             consistent: false,
             // Which nodes are removed depends on what has come so far.
             order: OrderPromise::Dependent,
-            exact_opaque: over_opaque::of(values) == Opaque::First,
+            exact_opaque: OpaquePromise::where_first(values),
             seeded: false,
         }
     }

@@ -6,7 +6,8 @@ use crate::error::Result;
 use crate::param::Values;
 use crate::rop::stochastic::{self, Round, Sampler, Stochastic};
 use crate::rop::{
-    Blueprint, Family, Frame, Info, OrderPromise, Probe, Promises, Site, Threshold, depth_bits,
+    Blueprint, Family, Frame, Info, OpaquePromise, OrderPromise, Probe, Promises, Site, Threshold,
+    depth_bits,
 };
 use crate::trace::{Fragment, SampleMask, Unorm32};
 
@@ -37,7 +38,7 @@ impl Blueprint for AlphaToCoverage {
                 true => OrderPromise::Independent,
                 false => OrderPromise::Dependent,
             },
-            exact_opaque: true,
+            exact_opaque: OpaquePromise::Always,
             seeded: false,
         }
     }

@@ -11,8 +11,8 @@ use crate::error::Result;
 use crate::param::{Param, Values};
 use crate::rop::layers::{LAYERS, room};
 use crate::rop::{
-    Blueprint, Contents, Family, Frame, Info, OrderPromise, OverOpaque, Probe, Promises, Site,
-    StateBits, Transparent, over_opaque,
+    Blueprint, Contents, Family, Frame, Info, OpaquePromise, OrderPromise, OverOpaque, Probe,
+    Promises, Site, StateBits, Transparent, over_opaque,
 };
 use crate::trace::{Fragment, SampleMask, Unorm32};
 
@@ -58,7 +58,7 @@ impl Blueprint for DepthPeeling {
             consistent: false,
             order: OrderPromise::Independent,
             // The nearest layer of every sample is always peeled.
-            exact_opaque: true,
+            exact_opaque: OpaquePromise::Always,
             seeded: false,
         }
     }

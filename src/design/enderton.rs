@@ -7,8 +7,9 @@ use crate::param::{Param, Values};
 use crate::random::hash;
 use crate::rop::stochastic::{self, COMBINATIONS, METHOD, OPAQUE, ROUNDS, STRATA};
 use crate::rop::{
-    Blueprint, Dither, Family, Frame, Info, OrderPromise, PixelOrder, Probe, Promises, Reference,
-    ReferenceKey, Round, Sampler, Site, Stochastic, Threshold, depth_bits, random_subset,
+    Blueprint, Dither, Family, Frame, Info, OpaquePromise, OrderPromise, PixelOrder, Probe,
+    Promises, Reference, ReferenceKey, Round, Sampler, Site, Stochastic, Threshold, depth_bits,
+    random_subset,
 };
 use crate::tile::TileGrid;
 use crate::trace::{Fragment, MAX_SAMPLES, SampleMask, Unorm32};
@@ -103,7 +104,7 @@ impl Blueprint for Enderton {
                 true => OrderPromise::Independent,
                 false => OrderPromise::Dependent,
             },
-            exact_opaque: true,
+            exact_opaque: OpaquePromise::Always,
             seeded: true,
         };
         stochastic::promises(values, basic)

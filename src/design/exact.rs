@@ -3,8 +3,8 @@
 use crate::error::Result;
 use crate::param::Values;
 use crate::rop::{
-    Blueprint, Contents, Design, Family, Frame, Info, OrderPromise, Probe, Promises, Site,
-    StateBits,
+    Blueprint, Contents, Design, Family, Frame, Info, OpaquePromise, OrderPromise, Probe, Promises,
+    Site, StateBits,
 };
 use crate::trace::{DepthPlane, Fragment, SampleMask};
 
@@ -32,7 +32,7 @@ impl Blueprint for Exact {
             unbiased: true,
             consistent: true,
             order: OrderPromise::Independent,
-            exact_opaque: true,
+            exact_opaque: OpaquePromise::Always,
             seeded: false,
         }
     }

@@ -12,7 +12,8 @@ use crate::param::{Param, Values};
 use crate::random::hash;
 use crate::rop::stochastic::{self, Round, Sampler, Stochastic};
 use crate::rop::{
-    Blueprint, Family, Frame, Info, OrderPromise, Probe, Promises, Site, Threshold, depth_bits,
+    Blueprint, Family, Frame, Info, OpaquePromise, OrderPromise, Probe, Promises, Site, Threshold,
+    depth_bits,
 };
 use crate::trace::{Fragment, SampleMask, Unorm32};
 
@@ -60,7 +61,7 @@ impl Blueprint for HashedAlpha {
             unbiased: false,
             consistent: false,
             order: if apart { OrderPromise::Independent } else { OrderPromise::Dependent },
-            exact_opaque: true,
+            exact_opaque: OpaquePromise::Always,
             seeded: true,
         }
     }

@@ -6,8 +6,8 @@ use crate::error::Result;
 use crate::param::Values;
 use crate::rop::layers::{COVERAGE, LAYERS, Layer, Layering, composite, contents};
 use crate::rop::{
-    Blueprint, Contents, Family, Frame, Info, Opaque, OrderPromise, OverOpaque, Probe, Promises,
-    Site, StateBits, Transparent, over_opaque,
+    Blueprint, Contents, Family, Frame, Info, OpaquePromise, OrderPromise, OverOpaque, Probe,
+    Promises, Site, StateBits, Transparent, over_opaque,
 };
 use crate::trace::Fragment;
 
@@ -38,7 +38,7 @@ impl Blueprint for Hybrid {
             // Which layers end in the core and which in the tail does not depend on the
             // order, but the tail's sums are rounded as they come.
             order: OrderPromise::UpToRounding,
-            exact_opaque: over_opaque::of(values) == Opaque::First,
+            exact_opaque: OpaquePromise::where_first(values),
             seeded: false,
         }
     }

@@ -5,8 +5,8 @@ use crate::error::Result;
 use crate::param::Values;
 use crate::rop::layers::{COVERAGE, LAYERS, Layer, Layering, contents};
 use crate::rop::{
-    Blueprint, Contents, Family, Frame, Info, Opaque, OrderPromise, OverOpaque, Probe, Promises,
-    Site, StateBits, Transparent, over_opaque,
+    Blueprint, Contents, Family, Frame, Info, OpaquePromise, OrderPromise, OverOpaque, Probe,
+    Promises, Site, StateBits, Transparent, over_opaque,
 };
 use crate::trace::Fragment;
 
@@ -37,7 +37,7 @@ impl Blueprint for KBuffer {
             unbiased: false,
             consistent: false,
             order: OrderPromise::Independent,
-            exact_opaque: over_opaque::of(values) == Opaque::First,
+            exact_opaque: OpaquePromise::where_first(values),
             seeded: false,
         }
     }

@@ -11,7 +11,8 @@ use crate::rop::tracked::{
     chance_decides_surfaces,
 };
 use crate::rop::{
-    Blueprint, Family, Frame, Info, OrderPromise, Promises, Reference, Stochastic, depth_bits,
+    Blueprint, Family, Frame, Info, OpaquePromise, OrderPromise, Promises, Reference, Stochastic,
+    depth_bits,
 };
 
 /// The design's entry in the registry.
@@ -61,7 +62,7 @@ impl Blueprint for LaineKarras {
             consistent: apart
                 && (scrambled || (values.flag(COMPACT.name) && values.flag(SORT.name))),
             order: OrderPromise::Dependent,
-            exact_opaque: true,
+            exact_opaque: OpaquePromise::Always,
             seeded: true,
         };
         stochastic::promises(values, basic)

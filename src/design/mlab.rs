@@ -5,8 +5,8 @@ use crate::error::Result;
 use crate::param::Values;
 use crate::rop::layers::{COVERAGE, LAYERS, Layer, Layering, contents};
 use crate::rop::{
-    Blueprint, Contents, Family, Frame, Info, Opaque, OrderPromise, OverOpaque, Probe, Promises,
-    Site, StateBits, Transparent, over_opaque,
+    Blueprint, Contents, Family, Frame, Info, OpaquePromise, OrderPromise, OverOpaque, Probe,
+    Promises, Site, StateBits, Transparent, over_opaque,
 };
 use crate::trace::Fragment;
 
@@ -36,7 +36,7 @@ impl Blueprint for Mlab {
             consistent: false,
             // What comes between two that are already merged cannot part them.
             order: OrderPromise::Dependent,
-            exact_opaque: over_opaque::of(values) == Opaque::First,
+            exact_opaque: OpaquePromise::where_first(values),
             seeded: false,
         }
     }
@@ -104,6 +104,7 @@ mod tests {
             background: [1.0; 3],
             seed: 0,
             colour_bits: 48,
+            primitive_depths: None,
         };
         let fragment = |z: u32, colour: f32, alpha: f32| Fragment {
             x: 0,

@@ -3,6 +3,7 @@
 mod abuffer;
 mod adaptive;
 mod alpha_to_coverage;
+mod blend;
 mod depth_peeling;
 mod enderton;
 mod exact;
@@ -10,15 +11,20 @@ mod hashed_alpha;
 mod hybrid;
 mod kbuffer;
 mod lk;
+mod mboit;
 mod mlab;
 mod slab;
+mod sorted_blend;
 mod systematic;
+mod wboit;
 
 use std::fmt;
+use std::sync::Arc;
 
 pub use abuffer::ABuffer;
 pub use adaptive::Adaptive;
 pub use alpha_to_coverage::AlphaToCoverage;
+pub use blend::Blend;
 pub use depth_peeling::DepthPeeling;
 pub use enderton::Enderton;
 pub use exact::Exact;
@@ -26,19 +32,23 @@ pub use hashed_alpha::HashedAlpha;
 pub use hybrid::Hybrid;
 pub use kbuffer::KBuffer;
 pub use lk::LaineKarras;
+pub use mboit::MomentBased;
 pub use mlab::Mlab;
 pub use slab::Slab;
+pub use sorted_blend::SortedBlend;
 pub use systematic::Systematic;
+pub use wboit::WeightedBlended;
 
 use crate::error::{Error, Result};
 use crate::param::{Values, parse_spec};
 use crate::rop::{
-    Blueprint, Engine, Explanation, Frame, Info, Promises, ReplayOptions, Replayed, Site,
-    StateBits, explain, replay,
+    Blueprint, Engine, Explanation, Frame, Info, PrimitiveDepths, Promises, ReplayOptions,
+    Replayed, Site, StateBits, explain, replay,
 };
 use crate::trace::Trace;
 
-/// All designs.
+/// All designs. A static: a constant would be compiled anew, for every sample count,
+/// into each crate that names it.
 pub static DESIGNS: &[Entry] = &[
     Entry::of::<Exact>(),
     Entry::of::<LaineKarras>(),
@@ -53,6 +63,10 @@ pub static DESIGNS: &[Entry] = &[
     Entry::of::<Hybrid>(),
     Entry::of::<Adaptive>(),
     Entry::of::<DepthPeeling>(),
+    Entry::of::<Blend>(),
+    Entry::of::<SortedBlend>(),
+    Entry::of::<WeightedBlended>(),
+    Entry::of::<MomentBased>(),
 ];
 
 /// The name of the design that others are measured against.
@@ -66,6 +80,8 @@ pub struct Entry {
     pub info: Info,
     promises: fn(&Values) -> Promises,
     build: fn(&Values, &Frame) -> Result<Box<dyn Engine>>,
+    /// Whether the frame must hold the primitives' mean depths.
+    primitive_depths: bool,
 }
 
 /// Calls a function with the frame's sample count as a constant.
@@ -100,6 +116,7 @@ impl Entry {
             info: B::INFO,
             promises: B::promises,
             build: |values, frame| for_samples!(frame.samples(), build_at::<B>(values, frame)),
+            primitive_depths: B::PRIMITIVE_DEPTHS,
         }
     }
 
@@ -160,7 +177,7 @@ impl Configured {
         seed: u32,
         options: &ReplayOptions<'_>,
     ) -> Result<Replayed> {
-        let frame = Frame::of(trace, samples, seed)?;
+        let frame = self.frame(trace, samples, seed)?;
         replay(&*self.build(&frame)?, &frame, trace, options)
     }
 
@@ -177,7 +194,7 @@ impl Configured {
         site: Site,
         progress: &dyn Fn(u64, u64),
     ) -> Result<Explanation> {
-        let frame = Frame::of(trace, samples, seed)?;
+        let frame = self.frame(trace, samples, seed)?;
         if !frame.grid.contains((site.x.into(), site.y.into())) {
             return Err(Error::config(
                 format_args!("pixel {},{} lies outside the frame", site.x, site.y),
@@ -193,6 +210,15 @@ impl Configured {
     /// As [`Blueprint::at`].
     pub fn state_bits(&self, frame: &Frame) -> Result<StateBits> {
         Ok(self.build(frame)?.state_bits())
+    }
+
+    /// The frame, with what the design asks to know of the whole trace beforehand.
+    fn frame(&self, trace: &Trace, samples: u32, seed: u32) -> Result<Frame> {
+        let mut frame = Frame::of(trace, samples, seed)?;
+        if self.entry.primitive_depths {
+            frame.primitive_depths = Some(Arc::new(PrimitiveDepths::of(trace)?));
+        }
+        Ok(frame)
     }
 
     /// The design for the frame.

@@ -40,8 +40,8 @@ use crate::rop::layers::{
     COVERAGE, Columns, Coverage, Deep, LAYERS, Layer, composite, contents, insert, nearer, room,
 };
 use crate::rop::{
-    Blueprint, Contents, Family, Frame, Info, Normalise, Opaque, OrderPromise, OverOpaque, Probe,
-    Promises, Site, StateBits, Sums, Threshold, Transparent, over_opaque, random_subset,
+    Blueprint, Contents, Family, Frame, Info, Normalise, OpaquePromise, OrderPromise, OverOpaque,
+    Probe, Promises, Site, StateBits, Sums, Threshold, Transparent, over_opaque, random_subset,
     visible_independent, visible_stratified,
 };
 use crate::trace::{Fragment, SampleMask, Unorm32};
@@ -145,7 +145,7 @@ impl Blueprint for Slab {
                 (true, false) => OrderPromise::UpToRounding,
                 (false, _) => OrderPromise::Dependent,
             },
-            exact_opaque: over_opaque::of(values) == Opaque::First,
+            exact_opaque: OpaquePromise::where_first(values),
             seeded: bits != 0,
         }
     }

@@ -14,8 +14,8 @@ use crate::rop::tracked::{
     TrackedSampler, chance_decides_surfaces,
 };
 use crate::rop::{
-    Blueprint, Dither, Family, Frame, Info, OrderPromise, Promises, Reference, Stochastic,
-    depth_bits,
+    Blueprint, Dither, Family, Frame, Info, OpaquePromise, OrderPromise, Promises, Reference,
+    Stochastic, depth_bits,
 };
 
 crate::options! {
@@ -77,7 +77,7 @@ impl Blueprint for Systematic {
             unbiased: apart && scrambled && !chance_decides_surfaces(values),
             consistent: apart,
             order: OrderPromise::Dependent,
-            exact_opaque: true,
+            exact_opaque: OpaquePromise::Always,
             seeded: true,
         };
         stochastic::promises(values, basic)

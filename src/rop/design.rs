@@ -7,6 +7,8 @@ use serde::Serialize;
 use crate::error::Result;
 use crate::param::{Param, Values};
 use crate::rop::event::Probe;
+use crate::rop::over_opaque::{self, Opaque};
+use crate::rop::primitive_depths::PrimitiveDepths;
 use crate::rop::samples::SampleContents;
 use crate::tile::TileGrid;
 use crate::trace::{ColourFormat, Fragment, Trace, Unorm32};
@@ -24,6 +26,8 @@ pub struct Frame {
     pub seed: u32,
     /// Bits that a stored colour takes.
     pub colour_bits: u32,
+    /// The primitives' mean depths, for a design that asks for them.
+    pub primitive_depths: Option<Arc<PrimitiveDepths>>,
 }
 
 impl Frame {
@@ -42,6 +46,7 @@ impl Frame {
                 ColourFormat::F16 => 48,
                 ColourFormat::F32 => 96,
             },
+            primitive_depths: None,
         })
     }
 
@@ -157,10 +162,8 @@ pub struct Promises {
     pub consistent: bool,
     /// What the order does in which fragments of different depths arrive.
     pub order: OrderPromise,
-    /// However opaque fragments share pixels and depths, their picture is the exact one.
-    /// (That of opaque fragments at different depths that cover whole pixels always is,
-    /// unless the design is told to forgo the z-buffer that holds them.)
-    pub exact_opaque: bool,
+    /// Where the picture of opaque fragments is the exact one.
+    pub exact_opaque: OpaquePromise,
     /// The picture depends on the seed.
     pub seeded: bool,
 }
@@ -171,13 +174,19 @@ impl Promises {
         let order = match self.order {
             OrderPromise::Independent => "independent of order",
             OrderPromise::UpToRounding => "independent of order up to rounding",
+            OrderPromise::AmplifiedRounding => "independent of order up to amplified rounding",
             OrderPromise::Dependent => "",
+        };
+        let opaque = match self.exact_opaque {
+            OpaquePromise::Always => "exact where opaque",
+            OpaquePromise::WholePixels => "exact where opaque over whole pixels",
+            OpaquePromise::Never => "",
         };
         let list = [
             (self.unbiased, "unbiased"),
             (self.consistent, "consistent"),
             (!order.is_empty(), order),
-            (self.exact_opaque, "exact where opaque"),
+            (!opaque.is_empty(), opaque),
             (!self.seeded, "the same for every seed"),
         ];
         list.iter().filter(|(holds, _)| *holds).map(|(_, word)| *word).collect()
@@ -192,8 +201,34 @@ pub enum OrderPromise {
     Independent,
     /// It changes in which order sums are rounded and nothing else.
     UpToRounding,
+    /// So does this; but what the design makes of its sums amplifies their rounding,
+    /// where depths lie close together until it shows.
+    AmplifiedRounding,
     /// It changes the picture.
     Dependent,
+}
+
+/// Where the picture of opaque fragments (alpha 1) is the exact one.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum OpaquePromise {
+    /// However they share pixels.
+    Always,
+    /// Where each covers whole pixels.
+    WholePixels,
+    /// Not even there.
+    Never,
+}
+
+impl OpaquePromise {
+    /// The promise of a design that blends or sums what it draws, and so owes what is
+    /// exact to the z-buffer of [`OverOpaque`](crate::rop::OverOpaque).
+    pub fn where_first(values: &Values) -> Self {
+        match over_opaque::of(values) {
+            Opaque::First => OpaquePromise::Always,
+            Opaque::Together => OpaquePromise::Never,
+        }
+    }
 }
 
 crate::options! {
@@ -228,6 +263,11 @@ pub struct Info {
 pub trait Blueprint: 'static {
     /// What a listing says about it.
     const INFO: Info;
+
+    /// Whether it asks for [`Frame::primitive_depths`]. That takes a pass over the trace
+    /// before the design is built, which is counted nowhere: it stands for what an
+    /// application knows of its own primitives.
+    const PRIMITIVE_DEPTHS: bool = false;
 
     /// The design for pixels of `N` samples.
     type At<const N: usize>: Design;

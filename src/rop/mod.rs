@@ -1,15 +1,19 @@
 //! What the raster-operations units share: pixel state, surface tracking, sample
 //! order, reference values, event counts, and the replay.
 
+pub mod accumulators;
+mod blend_buffer;
 pub mod depth_bits;
 mod design;
 mod dither;
 mod event;
 pub mod layers;
+mod moments;
 mod normalise;
 mod opacity;
 pub mod over_opaque;
 mod pixel_order;
+mod primitive_depths;
 mod reference_value;
 mod replay;
 mod samples;
@@ -17,16 +21,22 @@ pub mod stochastic;
 mod subset;
 mod surface;
 pub mod tracked;
+pub mod view_depth;
 
+pub use accumulators::{Accumulators, Coverage};
+pub use blend_buffer::BlendBuffer;
 pub use design::{
-    Blueprint, Contents, Design, Family, Frame, Info, OrderPromise, Promises, Site, StateBits,
+    Blueprint, Contents, Design, Family, Frame, Info, OpaquePromise, OrderPromise, Promises, Site,
+    StateBits,
 };
 pub use dither::{BAYER, BLUE_NOISE, Dither, Ranks, TILE};
 pub use event::{EventCounts, NoProbe, Probe, Record, ReferenceRecord};
+pub use moments::{MomentCount, Moments};
 pub use normalise::{Normalise, Sums};
 pub use opacity::Threshold;
 pub use over_opaque::{Opaque, OverOpaque, Transparent};
 pub use pixel_order::{PixelIndex, PixelOrder};
+pub use primitive_depths::PrimitiveDepths;
 pub use reference_value::{Reference, ReferenceKey, prehash, scramble_lk2011};
 pub use replay::{
     Engine, Explanation, ReplayOptions, Replayed, Step, TileState, Told, draw_pixel, explain,
@@ -36,3 +46,4 @@ pub use samples::{SampleContents, SampleList, Samples, in_sample_order, sort_by_
 pub use stochastic::{Round, Sampler, Stochastic};
 pub use subset::{random_subset, visible_independent, visible_stratified};
 pub use surface::{CoveredMask, SurfaceRule, SurfaceTracker, Tracked};
+pub use view_depth::ViewDepth;

@@ -11,7 +11,7 @@ use crate::param::{Param, Values};
 use crate::random::hash;
 use crate::resolve::box_filter;
 use crate::rop::depth_bits;
-use crate::rop::design::{Contents, Frame, OrderPromise, Promises, Site, StateBits};
+use crate::rop::design::{Contents, Frame, OpaquePromise, OrderPromise, Promises, Site, StateBits};
 use crate::rop::event::Probe;
 use crate::rop::over_opaque::{self, Opaque, OverOpaque, Transparent};
 use crate::rop::samples::Samples;
@@ -171,7 +171,10 @@ pub fn promises(values: &Values, basic: Promises) -> Promises {
             order => order,
         },
         // By their depths alone, opaque fragments at equal depths are all seen.
-        exact_opaque: basic.exact_opaque && !(depth_based && together),
+        exact_opaque: match depth_based && together {
+            true => OpaquePromise::WholePixels,
+            false => basic.exact_opaque,
+        },
         ..basic
     }
 }

@@ -93,6 +93,21 @@ fn three_fragments_cost_what_they_cost() {
     // No depth test; each fragment is kept: mask, plane, colour and alpha.
     let kept = 3 * (4 + 96 + 48 + 32);
     assert_eq!(events("exact"), counts([0, 0, 9], 0, [0; 3], 0, [0, kept]));
+
+    // Without a z-buffer, all 9 samples are blended or summed: a colour is 96 bits;
+    // colour, weight and transmittance are 160.
+    let all = |bits: u64| counts([0, 0, 9], 0, [0; 3], 0, [bits, bits]);
+    assert_eq!(events("blend:opaque=together"), all(9 * 96));
+    assert_eq!(events("sorted-blend:opaque=together"), all(9 * 96));
+    assert_eq!(events("wboit:opaque=together"), all(9 * 160));
+    assert_eq!(events("wboit:opaque=together,coverage=share"), all(3 * 160));
+    // 5 moments in the first pass; they and 128 bits of colour and weight in the second.
+    let state = [9 * 160 + 9 * 288, 9 * 160 + 9 * 128];
+    let twice = EventCounts { fragments: 6, ..counts([0, 0, 18], 0, [0; 3], 0, state) };
+    assert_eq!(events("mboit:opaque=together"), twice);
+    // With one, opaque fragments meet that and nothing else.
+    let first = EventCounts { fragments: 6, ..counts(samples, 0, [0; 3], 0, [depths, writes]) };
+    assert_eq!(events("blend"), first);
 }
 
 #[test]
@@ -126,6 +141,14 @@ fn state_per_pixel() {
         ("slab:normalise=none,opacity=discrete", 320, 8 * (32 + 4 + 48 + 16)),
         // A transmittance a sample, a colour, an alpha.
         ("slab", 320, 8 * 116 + 4 * 32 + 3 * 32 + 32),
+        // The opaque buffer's colours widened from 48 to 96 bits; without it, colours alone.
+        ("blend", 320 + 4 * 48, 0),
+        ("sorted-blend", 320 + 4 * 48, 0),
+        ("blend:opaque=together", 4 * 96, 0),
+        ("wboit", 320, 4 * 160),
+        ("wboit:coverage=share", 320, 160),
+        ("mboit", 320, 4 * (5 * 32 + 128)),
+        ("mboit:moments=8,coverage=share,opaque=together", 0, 9 * 32 + 128),
     ] {
         let expected = StateBits { samples, extra, unbounded: false };
         assert_eq!(design(spec).state_bits(&frame).unwrap(), expected, "{spec}");

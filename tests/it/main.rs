@@ -1,5 +1,6 @@
 //! The integration tests: one binary, one file a subject.
 
+mod blended;
 mod cli;
 mod conformance;
 mod events;

@@ -14,8 +14,8 @@ use screendoor::metrics::{Ensemble, Region, errors, student_t};
 use screendoor::param::Values;
 use screendoor::random::{Stream, hash};
 use screendoor::rop::{
-    Blueprint, Contents, Design, Family, Frame, Info, OrderPromise, Probe, Promises, Samples, Site,
-    StateBits, Threshold,
+    Blueprint, Contents, Design, Family, Frame, Info, OpaquePromise, OrderPromise, Probe, Promises,
+    Samples, Site, StateBits, Threshold,
 };
 use screendoor::tile::TileGrid;
 use screendoor::trace::{DepthPlane, Fragment, Header, SampleMask, Trace, Unorm32};
@@ -206,7 +206,7 @@ impl Blueprint for Planted {
             unbiased: true,
             consistent: true,
             order: OrderPromise::Independent,
-            exact_opaque: true,
+            exact_opaque: OpaquePromise::Always,
             seeded: true,
         }
     }

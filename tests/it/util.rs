@@ -4,7 +4,7 @@ use screendoor::design::{Configured, DESIGNS, Entry};
 use screendoor::param::{Kind, parse_spec};
 use screendoor::picture::Picture;
 use screendoor::random::Stream;
-use screendoor::rop::{ReplayOptions, over_opaque};
+use screendoor::rop::ReplayOptions;
 use screendoor::trace::{
     ColourFormat, DepthPlane, Fragment, Header, SampleMask, SamplePattern, Trace, TraceWriter,
     Unorm32, WriteOptions,
@@ -98,14 +98,6 @@ pub fn variants(entry: &Entry) -> Vec<Configured> {
         settings.push(parse_spec(&format!(":{combination}")).unwrap().1);
     }
     settings.iter().map(|given| entry.configure(given).unwrap()).collect()
-}
-
-/// Whether the design forgoes the z-buffer that holds opaque fragments for it: what it
-/// then makes of them is its own affair.
-pub fn forgoes_z_buffer(design: &Configured) -> bool {
-    design.values().iter().any(|(name, value)| {
-        name == over_opaque::PARAM.name && value.to_string() != over_opaque::PARAM.default
-    })
 }
 
 /// The design of a spec such as `lk:sort=false`.

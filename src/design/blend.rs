@@ -1,0 +1,81 @@
+//! Alpha blending in the order in which fragments arrive: what hardware does by
+//! itself, at the least cost, and wrong wherever something nearer came first.
+
+use crate::error::Result;
+use crate::param::Values;
+use crate::rop::over_opaque;
+use crate::rop::{
+    BlendBuffer, Blueprint, Contents, Family, Frame, Info, Opaque, OpaquePromise, OrderPromise,
+    OverOpaque, Probe, Promises, Site, StateBits, Transparent,
+};
+use crate::trace::Fragment;
+
+/// The design's entry in the registry.
+pub struct Blend;
+
+impl Blueprint for Blend {
+    const INFO: Info = Info {
+        name: "blend",
+        family: Family::Blended,
+        summary: "alpha blending in API order, sample by sample: the baseline of cost",
+        citation: "Porter, Duff: Compositing Digital Images, SIGGRAPH 1984, operator over",
+        params: &[over_opaque::PARAM],
+        combinations: &[],
+    };
+
+    type At<const N: usize> = OverOpaque<BlendAt<N>, N>;
+
+    fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
+        let opaque = over_opaque::of(values);
+        Ok(OverOpaque::new(frame, opaque, BlendAt { opaque, colour_bits: frame.colour_bits }))
+    }
+
+    fn promises(values: &Values) -> Promises {
+        Promises {
+            unbiased: false,
+            consistent: false,
+            order: OrderPromise::Dependent,
+            exact_opaque: OpaquePromise::where_first(values),
+            seeded: false,
+        }
+    }
+}
+
+/// The blending, for pixels of `N` samples.
+#[derive(Clone, Debug)]
+pub struct BlendAt<const N: usize> {
+    opaque: Opaque,
+    colour_bits: u32,
+}
+
+impl<const N: usize> Transparent<N> for BlendAt<N> {
+    type Pixel = BlendBuffer<N>;
+
+    fn state_bits(&self) -> StateBits {
+        BlendBuffer::<N>::state_bits(self.opaque, self.colour_bits)
+    }
+
+    fn clear(&self, _site: Site) -> BlendBuffer<N> {
+        BlendBuffer::default()
+    }
+
+    fn draw<P: Probe>(
+        &self,
+        _pass: u32,
+        _site: Site,
+        buffer: &mut BlendBuffer<N>,
+        fragment: &Fragment,
+        probe: &mut P,
+    ) {
+        buffer.blend(fragment.coverage, fragment.colour, fragment.alpha);
+        BlendBuffer::<N>::tell(fragment.coverage, probe);
+    }
+
+    fn resolve(&self, _site: Site, buffer: &BlendBuffer<N>, behind: &[[f32; 3]; N]) -> [f64; 3] {
+        buffer.over(behind)
+    }
+
+    fn contents(&self, buffer: &BlendBuffer<N>) -> Contents {
+        buffer.contents()
+    }
+}

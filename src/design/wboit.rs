@@ -1,0 +1,226 @@
+//! Weighted blended order-independent transparency (McGuire and Bavoil, JCGT 2(2),
+//! 2013): the mean of all fragments, weighted by a guess from depth and alpha of how
+//! much of each is seen, over the background by the exact transmittance.
+
+use crate::error::Result;
+use crate::param::{Param, Values};
+use crate::rop::{
+    Accumulators, Blueprint, Contents, Coverage, Family, Frame, Info, OpaquePromise, OrderPromise,
+    OverOpaque, Probe, Promises, Site, StateBits, Transparent, ViewDepth, accumulators,
+    over_opaque, view_depth,
+};
+use crate::trace::{Fragment, Unorm32};
+
+crate::options! {
+    /// The weight of a fragment of opacity α at view depth z.
+    pub enum Weight {
+        Eq7 = "eq7": "alpha clamp(10 / (1e-5 + (z/5)^2 + (z/200)^6), 1e-2, 3e3)",
+        Eq8 = "eq8": "alpha clamp(10 / (1e-5 + (z/10)^3 + (z/200)^6), 1e-2, 3e3)",
+        Eq9 = "eq9": "alpha clamp(0.03 / (1e-5 + (z/200)^4), 1e-2, 3e3)",
+        Eq10 = "eq10": "alpha max(1e-2, 3e3 (1 - d)^3), d the stored depth as a fraction",
+        One = "one": "1: the plain mean by alpha (Bavoil and Myers 2008)",
+    }
+}
+
+impl Weight {
+    fn of(self, depth: &ViewDepth, z: Unorm32, alpha: f32) -> f64 {
+        let falling = |scale: f64, sum: f64| (scale / (1e-5 + sum)).clamp(1e-2, 3e3);
+        let over = |unit: f64, power| raised(depth.at(z) / unit, power);
+        let by_depth = match self {
+            Weight::Eq7 => falling(10.0, over(5.0, 2) + over(200.0, 6)),
+            Weight::Eq8 => falling(10.0, over(10.0, 3) + over(200.0, 6)),
+            Weight::Eq9 => falling(0.03, over(200.0, 4)),
+            Weight::Eq10 => (3e3 * raised(1.0 - view_depth::fraction(z), 3)).max(1e-2),
+            Weight::One => return 1.0,
+        };
+        f64::from(alpha) * by_depth
+    }
+}
+
+/// A whole power by multiplication, which rounds alike everywhere.
+fn raised(x: f64, power: u32) -> f64 {
+    (0..power).fold(1.0, |product, _| product * x)
+}
+
+/// The design's entry in the registry.
+pub struct WeightedBlended;
+
+impl Blueprint for WeightedBlended {
+    const INFO: Info = Info {
+        name: "wboit",
+        family: Family::Blended,
+        summary: "weighted blended: the fragments' mean, weighted by depth and alpha, in one pass of sums",
+        citation: "McGuire, Bavoil: Weighted Blended Order-Independent Transparency, JCGT 2(2), 2013",
+        params: &[
+            Param::choice::<Weight>("weight", "eq7", "a fragment's weight (the paper's equations)"),
+            view_depth::NEAR,
+            view_depth::RANGE,
+            view_depth::LENS,
+            accumulators::PARAM,
+            over_opaque::PARAM,
+        ],
+        combinations: &["weight=one,coverage=share", "coverage=share,opaque=together"],
+    };
+
+    type At<const N: usize> = OverOpaque<WeightedBlendedAt<N>, N>;
+
+    fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
+        let inner = WeightedBlendedAt {
+            weight: values.choice("weight"),
+            depth: ViewDepth::of(values),
+            coverage: accumulators::of(values),
+        };
+        Ok(OverOpaque::new(frame, over_opaque::of(values), inner))
+    }
+
+    fn promises(values: &Values) -> Promises {
+        Promises {
+            unbiased: false,
+            consistent: false,
+            order: OrderPromise::UpToRounding,
+            exact_opaque: OpaquePromise::where_first(values),
+            seeded: false,
+        }
+    }
+}
+
+/// The sums, for pixels of `N` samples.
+#[derive(Clone, Debug)]
+pub struct WeightedBlendedAt<const N: usize> {
+    weight: Weight,
+    depth: ViewDepth,
+    coverage: Coverage,
+}
+
+/// What is kept of all fragments together.
+#[derive(Clone, Debug)]
+pub struct Sums {
+    /// Σ w α c.
+    colour: [f32; 3],
+    /// Σ w α.
+    weight: f32,
+    /// Π (1 − α).
+    transmittance: f32,
+}
+
+/// Bits of these.
+const SUMS_BITS: u32 = 5 * 32;
+
+impl Default for Sums {
+    fn default() -> Self {
+        Sums { colour: [0.0; 3], weight: 0.0, transmittance: 1.0 }
+    }
+}
+
+impl Sums {
+    /// What is seen of the fragments: their mean, by their opacity together.
+    fn seen(&self) -> [f64; 3] {
+        let opacity = 1.0 - f64::from(self.transmittance);
+        let weight = f64::from(self.weight);
+        self.colour.map(|c| if weight > 0.0 { f64::from(c) / weight * opacity } else { 0.0 })
+    }
+}
+
+impl<const N: usize> Transparent<N> for WeightedBlendedAt<N> {
+    type Pixel = Accumulators<Sums>;
+
+    fn state_bits(&self) -> StateBits {
+        let extra = SUMS_BITS * self.coverage.sums(N) as u32;
+        StateBits { samples: 0, extra, unbounded: false }
+    }
+
+    fn clear(&self, _site: Site) -> Self::Pixel {
+        Accumulators::default()
+    }
+
+    fn draw<P: Probe>(
+        &self,
+        _pass: u32,
+        _site: Site,
+        pixel: &mut Self::Pixel,
+        fragment: &Fragment,
+        probe: &mut P,
+    ) {
+        // Shaded once a fragment, at the pixel's centre, whatever the samples.
+        let alpha = self.coverage.alpha(fragment, N);
+        let weight = self.weight.of(&self.depth, fragment.depth.z, alpha);
+        let weighted = (weight * f64::from(alpha)) as f32;
+        let touched = self.coverage.touched(fragment.coverage);
+        let sums = pixel.touch(self.coverage.sums(N));
+        for s in touched.iter() {
+            let sums = &mut sums[s];
+            for (sum, c) in sums.colour.iter_mut().zip(fragment.colour) {
+                *sum += weighted * c;
+            }
+            sums.weight += weighted;
+            sums.transmittance *= 1.0 - alpha;
+        }
+        probe.written(fragment.coverage);
+        probe.state(SUMS_BITS * touched.count(), SUMS_BITS * touched.count());
+    }
+
+    fn resolve(&self, _site: Site, pixel: &Self::Pixel, behind: &[[f32; 3]; N]) -> [f64; 3] {
+        pixel.over(behind, |sums| (sums.seen(), f64::from(sums.transmittance)))
+    }
+
+    fn contents(&self, pixel: &Self::Pixel) -> Contents {
+        let list = |value: fn(&Sums) -> f32| accumulators::list(pixel.get().iter().map(value));
+        let fields =
+            vec![("weights", list(|s| s.weight)), ("transmittance", list(|s| s.transmittance))];
+        Contents { samples: Vec::new(), fields }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rop::view_depth::Lens;
+
+    #[test]
+    fn weights_by_hand() {
+        // At view depth 10: 10/(1e-5 + 4 + 1.5625e-8), 10/(1e-5 + 1 + …), and at a
+        // depth of 1/2 of the range.
+        let depth = ViewDepth::new(10.0, 20.0, Lens::Parallel);
+        let near = |weight: Weight| weight.of(&depth, Unorm32::NEAR, 0.5);
+        assert!((near(Weight::Eq7) - 0.5 * 2.499_993_7).abs() < 1e-6);
+        assert!((near(Weight::Eq8) - 0.5 * 9.999_899_9).abs() < 1e-5);
+        assert!((near(Weight::Eq9) - 0.5 * 0.03 / 1.625e-5).abs() < 1e-6);
+        assert_eq!(near(Weight::Eq10), 1500.0);
+        assert_eq!(near(Weight::One), 1.0);
+        let middle = Weight::Eq10.of(&depth, Unorm32(1 << 31), 1.0);
+        assert!((middle - 375.0).abs() < 1e-5);
+        // Clamped at either end.
+        let wide = ViewDepth::new(1e-3, 1e6, Lens::Parallel);
+        assert_eq!(Weight::Eq7.of(&wide, Unorm32::NEAR, 1.0), 3e3);
+        assert_eq!(Weight::Eq7.of(&wide, Unorm32::FAR, 1.0), 1e-2);
+    }
+
+    #[test]
+    fn a_pixel_by_hand() {
+        // Two fragments of weight 1: red at 0.5, green at 0.25. The mean by alpha is
+        // (2/3, 1/3, 0), the transmittance 3/8.
+        let design = WeightedBlendedAt::<1> {
+            weight: Weight::One,
+            depth: ViewDepth::new(1.0, 2.0, Lens::Parallel),
+            coverage: Coverage::Sample,
+        };
+        let mut pixel = Accumulators::default();
+        let site = Site { x: 0, y: 0 };
+        for (colour, alpha) in [([1.0, 0.0, 0.0], 0.5), ([0.0, 1.0, 0.0], 0.25)] {
+            let fragment = Fragment {
+                x: 0,
+                y: 0,
+                coverage: crate::trace::SampleMask::first(1),
+                depth: Default::default(),
+                colour,
+                alpha,
+                primitive: 0,
+                object: 0,
+            };
+            design.draw(0, site, &mut pixel, &fragment, &mut crate::rop::NoProbe);
+        }
+        let found = design.resolve(site, &pixel, &[[0.0, 0.0, 1.0]]);
+        let expected = [0.625 * 2.0 / 3.0, 0.625 / 3.0, 0.375];
+        assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-7), "{found:?}");
+    }
+}

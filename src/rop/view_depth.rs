@@ -1,0 +1,101 @@
+//! View depth: how far a fragment lies before the camera.
+//!
+//! A trace holds depths as a depth buffer does, from the near plane to the far one,
+//! and does not say where these planes stand. Techniques whose formulas take the
+//! distance along the view axis are told so by parameters, in the units of their
+//! formulas.
+
+use crate::param::{Param, Values};
+use crate::trace::Unorm32;
+
+crate::options! {
+    /// How depth grows from the near plane to the far one.
+    pub enum Lens {
+        Perspective = "perspective": "as a perspective camera's depth buffer does",
+        Parallel = "parallel": "in proportion, as along parallel lines of sight",
+    }
+}
+
+/// Where the near plane stands. By default the far plane stands twice as far, about as
+/// in a view that frames a scene with a common field of view.
+pub const NEAR: Param = Param::real("near", "10", (1e-3, 1e6), "view depth of the near plane");
+/// How far it is from there to the far plane.
+pub const RANGE: Param =
+    Param::real("range", "10", (1e-3, 1e6), "view depth from the near plane to the far plane");
+/// How depth grows between them.
+pub const LENS: Param =
+    Param::choice::<Lens>("lens", "perspective", "how depth grows between the planes");
+
+/// What turns a stored depth into a view depth.
+#[derive(Clone, Copy, Debug)]
+pub struct ViewDepth {
+    near: f64,
+    far: f64,
+    lens: Lens,
+}
+
+impl ViewDepth {
+    /// Between planes at view depths 0 < `near` < `far`.
+    pub fn new(near: f64, far: f64, lens: Lens) -> Self {
+        ViewDepth { near, far, lens }
+    }
+
+    /// As the parameters say.
+    pub fn of(values: &Values) -> Self {
+        let near = values.real(NEAR.name);
+        Self::new(near, near + values.real(RANGE.name), values.choice(LENS.name))
+    }
+
+    /// The view depth of `z`, between those of the two planes.
+    #[inline]
+    pub fn at(&self, z: Unorm32) -> f64 {
+        let (near, far, d) = (self.near, self.far, fraction(z));
+        match self.lens {
+            // d = f (z − n) / (z (f − n)), solved for z.
+            Lens::Perspective => near * far / (far - d * (far - near)),
+            Lens::Parallel => near + d * (far - near),
+        }
+    }
+
+    /// The logarithm of the view depth of `z`, −1 at the near plane and 1 at the far.
+    #[inline]
+    pub fn log_warped(&self, z: Unorm32) -> f64 {
+        let share = libm::log(self.at(z) / self.near) / libm::log(self.far / self.near);
+        // No range to speak of has no logarithm to speak of.
+        let share = if share.is_finite() { share.clamp(0.0, 1.0) } else { fraction(z) };
+        2.0 * share - 1.0
+    }
+}
+
+/// A stored depth as a fraction: 0 at the near plane, 1 at the far one.
+#[inline]
+pub fn fraction(z: Unorm32) -> f64 {
+    f64::from(z.0) / f64::from(u32::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_planes_stand_where_they_are_said_to() {
+        for lens in [Lens::Perspective, Lens::Parallel] {
+            for (near, far) in [(0.1, 500.0), (1.0, 2.0), (1e6, 1e6 + 1e-3), (1e-3, 1e6)] {
+                let depth = ViewDepth { near, far, lens };
+                assert!((depth.at(Unorm32::NEAR) / near - 1.0).abs() < 1e-9);
+                assert!((depth.at(Unorm32::FAR) / far - 1.0).abs() < 1e-9);
+                assert!((depth.log_warped(Unorm32::NEAR) + 1.0).abs() < 1e-9);
+                assert!((depth.log_warped(Unorm32::FAR) - 1.0).abs() < 1e-3);
+            }
+        }
+    }
+
+    #[test]
+    fn a_perspective_depth_by_hand() {
+        // n = 1, f = 4: z = 2 has depth 4·1/(2·3) = 2/3, and lies at ln 2/ln 4 = 1/2.
+        let depth = ViewDepth { near: 1.0, far: 4.0, lens: Lens::Perspective };
+        let z = Unorm32((f64::from(u32::MAX) * 2.0 / 3.0) as u32);
+        assert!((depth.at(z) - 2.0).abs() < 1e-8);
+        assert!(depth.log_warped(z).abs() < 1e-8);
+    }
+}
