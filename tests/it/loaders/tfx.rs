@@ -15,7 +15,7 @@ pub fn tfx(strands: u32, points: u32, edit: impl Fn(&mut [u32; 40])) -> Vec<u8> 
     let mut bytes: Vec<u8> = head.iter().flat_map(|w| w.to_le_bytes()).collect();
     for strand in 0..strands {
         for k in 0..points {
-            let y = k as f32 * (1.0 + strand as f32 * 0.1);
+            let y = k as f32 * (1.0 + strand as f32 * 0.25);
             let point = [strand as f32, y, 0.0, f32::from(k > 1)];
             bytes.extend(point.iter().flat_map(|v| v.to_le_bytes()));
         }
@@ -39,7 +39,7 @@ fn strands_are_read() {
     let scene = load(&tfx(3, 4, |_| ())).unwrap();
     let hair = strands(&scene);
     assert_eq!(hair.starts, [0, 4, 8, 12]);
-    assert_eq!(hair.points[7], Vec3::new(1.0, 3.3, 0.0));
+    assert_eq!(hair.points[7], Vec3::new(1.0, 3.75, 0.0));
     // Thinner towards the tip, and the same for hair of any size.
     assert!(hair.radii[0] > hair.radii[3] && hair.radii[0] == hair.radii[4]);
     assert_eq!(scene.materials[0].base.w, 0.5);
