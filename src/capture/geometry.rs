@@ -222,6 +222,33 @@ mod tests {
     }
 
     #[test]
+    fn ellipsoids_are_seen_as_their_outlines() {
+        // From the front, along parallel lines.
+        let scene = crate::scene::load("builtin:ramps").unwrap();
+        let camera = Camera::frame(&scene, &Default::default(), 8, 8).unwrap();
+        let seen = |axes: DMat3, towards| outline(&axes, &camera, towards);
+        let close = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).abs() + (a[1] - b[1]).abs() < 1e-12;
+        let ball = DMat3::from_diagonal(DVec3::splat(2.0));
+        assert!(close(seen(ball, DVec3::Z).1, [2.0, 2.0]));
+        // Depth does not show, and the longer axis comes first.
+        let long = DMat3::from_diagonal(DVec3::new(1.0, 3.0, 9.0));
+        let (angle, axes) = seen(long, DVec3::Z);
+        assert!(
+            close(axes, [3.0, 1.0]) && (angle.abs() - std::f64::consts::FRAC_PI_2).abs() < 1e-4,
+            "{angle}"
+        );
+        let (angle, axes) = seen(DMat3::from_rotation_z(0.5) * long, DVec3::Z);
+        assert!(close(axes, [3.0, 1.0]));
+        assert!(((angle - 0.5).abs() - std::f64::consts::FRAC_PI_2).abs() < 1e-4, "{angle}");
+        // From a third aside, what is deep reaches a third as far to the side.
+        let (_, axes) = seen(
+            DMat3::from_diagonal(DVec3::new(0.0, 1.0, 9.0)),
+            DVec3::new(1.0, 0.0, 3.0).normalize(),
+        );
+        assert!(close(axes, [3.0, 1.0]));
+    }
+
+    #[test]
     fn a_mirrored_object_keeps_its_outside() {
         let place = Place::new(DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0)));
         assert_eq!(place.normals * DVec3::X, -DVec3::X);

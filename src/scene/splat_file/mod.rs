@@ -24,7 +24,7 @@ use crate::error::{Error, Result};
 use crate::picture::srgb;
 use crate::scene::bytes::Bytes;
 use crate::scene::{
-    AlphaMode, Material, Particles, Scene, Shape, TextureUse, file, file_name, sprite,
+    AlphaMode, Material, Particles, Scene, Shape, TextureUse, View, file, file_name, sprite,
 };
 
 /// How many splats share a chunk.
@@ -62,6 +62,8 @@ pub(super) fn load(path: &Path) -> Result<Scene> {
             unlit: true,
             ..Material::default()
         }],
+        // Which side is the front, no file says.
+        view: View { yaw: -30.0, pitch: 10.0, ..View::default() },
         ..Scene::default()
     };
     if find("sh").is_some() {
