@@ -18,7 +18,7 @@ const COLOUR: [f32; 3] = [0.22, 0.10, 0.045];
 const ALPHA: f32 = 0.5;
 /// Half of a strand's width, as a share of the diagonal of the box that holds the
 /// hair, and how much thinner its tip is.
-const RADIUS: f32 = 0.0008;
+const RADIUS: f32 = 0.0012;
 const TIP: f32 = 0.4;
 /// The most points that are read.
 const MAX_POINTS: usize = 1 << 26;
