@@ -151,6 +151,23 @@ fn strand_triangle(
     }
 }
 
+/// The outline of an ellipsoid with the columns of `axes` for semi-axes, on the plane
+/// through its centre that faces the camera, seen from `towards`: how its longer axis
+/// is turned from the camera's right, in radians, and its two semi-axes. From near by
+/// the outline is no ellipse; what stands here is its affine approximation (Zwicker et
+/// al. 2001, EWA volume splatting).
+fn outline(axes: &DMat3, camera: &Camera, towards: DVec3) -> (f64, [f64; 2]) {
+    // What lies beside the camera is nearly on edge, and out of sight.
+    let ahead = towards.dot(camera.back).max(0.1);
+    let seen = |axis: DVec3| axes.transpose() * (axis - camera.back * (axis.dot(towards) / ahead));
+    let (right, up) = (seen(camera.right), seen(camera.up));
+    // The quadratic form of the outline, and its eigenvalues.
+    let [a, b, c] = [right.dot(right), right.dot(up), up.dot(up)];
+    let (mean, half) = ((a + c) / 2.0, (a - c) / 2.0);
+    let spread = libm::hypot(half, b);
+    (libm::atan2(b, half) / 2.0, [mean + spread, (mean - spread).max(0.0)].map(f64::sqrt))
+}
+
 /// How many of 0..`count` come before the first that does not hold.
 fn partition(count: usize, holds: impl Fn(usize) -> bool) -> usize {
     let (mut low, mut high) = (0, count);
@@ -169,19 +186,22 @@ fn particle_triangle(
 ) -> [Vertex; 3] {
     let i = local as usize / 2;
     let centre = place.transform_point3(particles.centres[i].as_dvec3());
-    let size = f64::from(particles.sizes[i]) * place.matrix3.determinant().abs().cbrt();
-    let (sin, cos) = libm::sincos(particles.angles.get(i).map_or(0.0, |a| f64::from(*a)));
+    let (angle, size) = match particles.axes.get(i) {
+        Some(axes) => outline(&(place.matrix3 * axes.as_dmat3()), camera, camera.towards(centre)),
+        None => {
+            let size = f64::from(particles.sizes[i]) * place.matrix3.determinant().abs().cbrt();
+            (particles.angles.get(i).map_or(0.0, |a| f64::from(*a)), [size; 2])
+        }
+    };
+    let (sin, cos) = libm::sincos(angle);
     let (x_axis, y_axis) =
         (camera.right * cos + camera.up * sin, camera.up * cos - camera.right * sin);
-    let corner = |x: f64, y: f64| {
-        let outwards = x_axis * x + y_axis * y;
-        Vertex {
-            position: centre + outwards * size,
-            // Bulging towards the camera, as a puff of smoke would.
-            normal: (camera.back + outwards * 0.7).as_vec3(),
-            uv: Vec2::new(x as f32 * 0.5 + 0.5, 0.5 - y as f32 * 0.5),
-            colour: particles.colours.get(i).copied().unwrap_or(Vec4::ONE),
-        }
+    let corner = |x: f64, y: f64| Vertex {
+        position: centre + x_axis * (x * size[0]) + y_axis * (y * size[1]),
+        // Bulging towards the camera, as a puff of smoke would.
+        normal: (camera.back + (x_axis * x + y_axis * y) * 0.7).as_vec3(),
+        uv: Vec2::new(x as f32 * 0.5 + 0.5, 0.5 - y as f32 * 0.5),
+        colour: particles.colours.get(i).copied().unwrap_or(Vec4::ONE),
     };
     if local.is_multiple_of(2) {
         [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0)]
@@ -199,6 +219,33 @@ mod tests {
         for boundary in 0..10 {
             assert_eq!(partition(9, |i| i < boundary), boundary.min(9));
         }
+    }
+
+    #[test]
+    fn ellipsoids_are_seen_as_their_outlines() {
+        // From the front, along parallel lines.
+        let scene = crate::scene::load("builtin:ramps").unwrap();
+        let camera = Camera::frame(&scene, &Default::default(), 8, 8).unwrap();
+        let seen = |axes: DMat3, towards| outline(&axes, &camera, towards);
+        let close = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).abs() + (a[1] - b[1]).abs() < 1e-12;
+        let ball = DMat3::from_diagonal(DVec3::splat(2.0));
+        assert!(close(seen(ball, DVec3::Z).1, [2.0, 2.0]));
+        // Depth does not show, and the longer axis comes first.
+        let long = DMat3::from_diagonal(DVec3::new(1.0, 3.0, 9.0));
+        let (angle, axes) = seen(long, DVec3::Z);
+        assert!(
+            close(axes, [3.0, 1.0]) && (angle.abs() - std::f64::consts::FRAC_PI_2).abs() < 1e-4,
+            "{angle}"
+        );
+        let (angle, axes) = seen(DMat3::from_rotation_z(0.5) * long, DVec3::Z);
+        assert!(close(axes, [3.0, 1.0]));
+        assert!(((angle - 0.5).abs() - std::f64::consts::FRAC_PI_2).abs() < 1e-4, "{angle}");
+        // From a third aside, what is deep reaches a third as far to the side.
+        let (_, axes) = seen(
+            DMat3::from_diagonal(DVec3::new(0.0, 1.0, 9.0)),
+            DVec3::new(1.0, 0.0, 3.0).normalize(),
+        );
+        assert!(close(axes, [3.0, 1.0]));
     }
 
     #[test]

@@ -19,7 +19,8 @@ use crate::trace::{
 /// Draw a scene and record its fragments as a trace
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// A .obj, .gltf or .glb file, or builtin:NAME[:parameter=value,…]
+    /// A .obj, .gltf, .glb, .vdb, .tfx or .ply (compressed Gaussian splats) file, or
+    /// builtin:NAME[:parameter=value,…]
     /// ('screendoor scenes' lists them)
     scene: OsString,
     /// The trace to write

@@ -2,18 +2,23 @@
 //! and from built-in generators.
 //!
 //! A scene knows nothing of pixels. [`load`] takes either the name of a file
-//! (OBJ, glTF, GLB) or `builtin:NAME`.
+//! (OBJ, glTF, GLB, OpenVDB, TressFX, compressed Gaussian splats) or `builtin:NAME`.
 
 pub mod builtin;
+mod bytes;
 mod file;
 mod gltf_file;
 mod material;
 mod obj_file;
+mod splat_file;
+mod sprite;
 mod texture;
+mod tfx_file;
+mod vdb_file;
 
 use std::path::{Path, PathBuf};
 
-use glam::{DAffine3, DVec3, Vec2, Vec3, Vec4};
+use glam::{DAffine3, DVec3, Mat3, Vec2, Vec3, Vec4};
 
 pub use material::{AlphaMode, Material, TextureUse};
 pub use texture::{Texture, Wrap};
@@ -63,7 +68,7 @@ pub enum Shape {
     Mesh(Mesh),
     /// Thin ribbons that face the camera.
     Strands(Strands),
-    /// Squares that face the camera.
+    /// Squares that face the camera, or the outlines of ellipsoids.
     Particles(Particles),
 }
 
@@ -93,10 +98,20 @@ impl Shape {
                 mesh.triangles.iter().flatten().map(|i| (mesh.positions[*i as usize], 0.0)),
             ),
             Shape::Strands(s) => Box::new(s.points.iter().copied().zip(s.radii.iter().copied())),
-            Shape::Particles(p) => Box::new(
+            Shape::Particles(p) if p.axes.is_empty() => Box::new(
                 // A square's corner is further from its centre than its side.
                 p.centres.iter().copied().zip(p.sizes.iter().map(|s| s * std::f32::consts::SQRT_2)),
             ),
+            // The corners of the boxes around the ellipsoids.
+            Shape::Particles(p) => {
+                let corner =
+                    |i: u32| Vec3::from([0, 1, 2].map(|k| 1.0 - (i >> k & 1) as f32 * 2.0));
+                let corners = move |(centre, axes): (&Vec3, &Mat3)| {
+                    let (centre, axes) = (*centre, *axes);
+                    (0..8).map(move |i| (centre + axes * corner(i), 0.0))
+                };
+                Box::new(p.centres.iter().zip(&p.axes).flat_map(corners))
+            }
         }
     }
 }
@@ -146,15 +161,18 @@ impl Strands {
     }
 }
 
-/// Squares that face the camera.
+/// Squares that face the camera, or the rectangles around the outlines of ellipsoids.
 #[derive(Clone, Debug, Default)]
 pub struct Particles {
     /// Centres.
     pub centres: Vec<Vec3>,
-    /// Half of the side.
+    /// Half of the side; of an ellipsoid the longest semi-axis.
     pub sizes: Vec<f32>,
-    /// Turn around the axis towards the camera, in radians.
+    /// Turn around the axis towards the camera, in radians; empty for none.
     pub angles: Vec<f32>,
+    /// Empty, or each particle is an ellipsoid that has the columns for semi-axes,
+    /// and no angle.
+    pub axes: Vec<Mat3>,
     /// Linear colours and alphas, multiplied into the material's.
     pub colours: Vec<Vec4>,
     /// Which of [`Scene::materials`].
@@ -404,10 +422,13 @@ pub fn load(source: &str) -> Result<Scene> {
             match ending.to_ascii_lowercase().as_str() {
                 "obj" => obj_file::load(path)?,
                 "gltf" | "glb" => gltf_file::load(path)?,
+                "vdb" => vdb_file::load(path)?,
+                "ply" => splat_file::load(path)?,
+                "tfx" => tfx_file::load(path)?,
                 other => {
                     return Err(Error::config(
                         format_args!("'{source}': scenes do not come as '.{other}'"),
-                        "give a .obj, .gltf or .glb file, or builtin:NAME",
+                        "give a .obj, .gltf, .glb, .vdb, .tfx or .ply file, or builtin:NAME",
                     ));
                 }
             }

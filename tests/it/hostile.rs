@@ -416,6 +416,37 @@ fn scenes() -> Vec<Hostile> {
                 j["extensionsUsed"] = serde_json::json!(["KHR_draco_mesh_compression"]);
             },
         ),
+        text(
+            "mesh.ply",
+            "ply\nformat ascii 1.0\nelement vertex 0\nend_header\n",
+            "stored as ascii",
+            "a PLY file of text",
+        ),
+        text(
+            "many.ply",
+            "ply\nformat binary_little_endian 1.0\nelement vertex 999999999999\n\
+             property uint packed_color\nend_header\n",
+            "999999999999 rows of 4 bytes, and 0 bytes are left",
+            "10^12 splats in no bytes",
+        ),
+        Hostile {
+            name: "many.tfx",
+            bytes: [&4_f32.to_le_bytes()[..], &[0xff, 0, 0, 0, 0xff, 0, 0, 0, 0xa0], &[0; 147]]
+                .concat(),
+            says: "needs 4",
+            what: "65025 points of hair in no bytes",
+        },
+        Hostile {
+            name: "metadata.vdb",
+            bytes: [
+                &b" BDV\0\0\0\0\xe0\0\0\0\x0b\0\0\0\0\0\0\0\x01"[..],
+                &[b'0'; 36],
+                b"\x01\0\0\0\xff\xff\xff\xff",
+            ]
+            .concat(),
+            says: "needs 4294967295",
+            what: "a name 4 GiB long",
+        },
         text("scene.stl", "solid\n", "do not come as '.stl'", "another format"),
     ]
 }

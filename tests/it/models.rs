@@ -75,3 +75,22 @@ fn obj_models_load_whole() {
     // The texture's alpha cuts the leaves out of their cards.
     assert!(cut.fragments < cards.fragments && cut.alpha.mean < 1.0);
 }
+
+#[test]
+#[ignore = "needs SCREENDOOR_MODELS"]
+fn clouds_and_hair_load_whole() {
+    let smoke = model("openusd_smoke_000003.vdb");
+    let billboards = smoke.triangle_count() / 2;
+    // Its 90 197 active voxels without those next to empty.
+    assert!((60_000..90_197).contains(&billboards), "{billboards}");
+    let stats = look(&smoke, None);
+    assert!(stats.depth_complexity.mean > 50.0 && stats.alpha.max < 0.05);
+
+    let hair = model("Ratboy_mohawk.tfx");
+    assert_eq!(hair.triangle_count(), 2228 * 31 * 2);
+    assert!(look(&hair, None).depth_complexity.mean > 3.0);
+
+    let guitar = model("guitar.compressed.ply");
+    assert_eq!(guitar.triangle_count(), 90_854 * 2);
+    assert!(look(&guitar, None).depth_complexity.mean > 50.0);
+}

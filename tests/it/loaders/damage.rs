@@ -6,7 +6,7 @@ use screendoor::random::Stream;
 use serde_json::json;
 
 use super::gltf::textured;
-use super::{folder, load_in, png};
+use super::{folder, load_in, png, splats, tfx, vdb};
 use crate::hostile;
 
 /// Changes a file as damage does: bytes changed, cut out, doubled, or words swapped
@@ -92,7 +92,15 @@ fn damaged_files_load_or_give_one_error() {
         j["images"] = json!([{ "bufferView": 0, "mimeType": "image/png" }, { "uri": "a.png" }]);
     });
     let glb = glb(&full);
-    let good: [(&str, &[u8]); 5] = [
+    let hair = tfx::tfx(4, 8, |_| ());
+    let packed = vdb::Written { packing: 6, half: true, ..vdb::full() }.bytes();
+    let zipped = vdb::Written { packing: 3, tile: Some(0.5), ..vdb::full() }.bytes();
+    let splats = splats::splats(&[[0x1234_5678, 0x4567_89ab, 0x89ab_cdef, 0xffee_ddcc]; 20]);
+    let good: [(&str, &[u8]); 9] = [
+        ("a.tfx", &hair),
+        ("a.ply", &splats),
+        ("b.vdb", &packed),
+        ("c.vdb", &zipped),
         ("a.obj", text.as_bytes()),
         ("a.mtl", mtl),
         ("a.png", &image),
@@ -100,7 +108,7 @@ fn damaged_files_load_or_give_one_error() {
         ("a.glb", &glb),
     ];
     let folder = folder(&good);
-    for name in ["a.obj", "a.gltf", "a.glb"] {
+    for name in ["a.obj", "a.gltf", "a.glb", "a.tfx", "a.ply", "b.vdb", "c.vdb"] {
         load_in(folder.path(), name).unwrap_or_else(|e| panic!("{name}: {e}"));
     }
     // SCREENDOOR_MUTATIONS: for a longer search, how many changes to each file.
@@ -121,7 +129,8 @@ fn damaged_files_load_or_give_one_error() {
         fs::write(folder.path().join(name), bytes).unwrap();
     }
     // The damage is neither always fatal nor never.
-    assert!((rounds..4 * rounds).contains(&failed), "{failed} of {}", 5 * rounds);
+    let all = good.len() as u32 * rounds;
+    assert!((all / 5..4 * all / 5).contains(&failed), "{failed} of {all}");
 }
 
 /// A GLB file of a document.

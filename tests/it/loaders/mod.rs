@@ -3,6 +3,9 @@
 mod damage;
 mod gltf;
 mod obj;
+mod splats;
+mod tfx;
+mod vdb;
 
 use std::fs;
 use std::io::Cursor;
@@ -10,7 +13,7 @@ use std::path::Path;
 
 use image::{DynamicImage, ImageFormat};
 use screendoor::error::Error;
-use screendoor::scene::{Mesh, Scene, Shape, load};
+use screendoor::scene::{Mesh, Particles, Scene, Shape, load};
 use tempfile::TempDir;
 
 const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
@@ -31,6 +34,13 @@ fn load_in(folder: &Path, name: &str) -> Result<Scene, Error> {
 fn mesh(scene: &Scene, i: usize) -> &Mesh {
     match &scene.shapes[scene.objects[i].shape] {
         Shape::Mesh(mesh) => mesh,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn particles(scene: &Scene) -> &Particles {
+    match &scene.shapes[0] {
+        Shape::Particles(particles) => particles,
         other => panic!("{other:?}"),
     }
 }
