@@ -180,7 +180,7 @@ mod tests {
     fn weights_by_hand() {
         // At view depth 10: 10/(1e-5 + 4 + 1.5625e-8), 10/(1e-5 + 1 + …), and at a
         // depth of 1/2 of the range.
-        let depth = ViewDepth::new(10.0, 20.0, Lens::Parallel);
+        let depth = ViewDepth::new(10.0, 10.0, Lens::Parallel);
         let near = |weight: Weight| weight.of(&depth, Unorm32::NEAR, 0.5);
         assert!((near(Weight::Eq7) - 0.5 * 2.499_993_7).abs() < 1e-6);
         assert!((near(Weight::Eq8) - 0.5 * 9.999_899_9).abs() < 1e-5);
@@ -201,7 +201,7 @@ mod tests {
         // (2/3, 1/3, 0), the transmittance 3/8.
         let design = WeightedBlendedAt::<1> {
             weight: Weight::One,
-            depth: ViewDepth::new(1.0, 2.0, Lens::Parallel),
+            depth: ViewDepth::new(1.0, 1.0, Lens::Parallel),
             coverage: Coverage::Sample,
         };
         let mut pixel = Accumulators::default();
