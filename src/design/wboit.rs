@@ -18,7 +18,7 @@ crate::options! {
         Eq8 = "eq8": "alpha clamp(10 / (1e-5 + (z/10)^3 + (z/200)^6), 1e-2, 3e3)",
         Eq9 = "eq9": "alpha clamp(0.03 / (1e-5 + (z/200)^4), 1e-2, 3e3)",
         Eq10 = "eq10": "alpha max(1e-2, 3e3 (1 - d)^3), d the stored depth as a fraction",
-        One = "one": "1: the plain mean by alpha (Bavoil and Myers 2008)",
+        One = "one": "1: the plain mean by alpha, as the colour of Bavoil and Myers 2008",
     }
 }
 
