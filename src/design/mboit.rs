@@ -27,8 +27,8 @@ impl Blueprint for MomentBased {
                 "bias",
                 "1",
                 (0.1, 10.0),
-                "how far moments are drawn towards those of a fixed measure, in units of the \
-                 supplement's 5e-7, 5e-6, 5e-5 for 4, 6, 8 moments",
+                "how far moments are drawn towards those of a fixed measure, in units of \
+                 5e-7, 5e-6, 5e-5 for 4, 6, 8 moments",
             ),
             Param::real(
                 "overestimation",

@@ -18,7 +18,7 @@ crate::options! {
         Eq8 = "eq8": "alpha clamp(10 / (1e-5 + (z/10)^3 + (z/200)^6), 1e-2, 3e3)",
         Eq9 = "eq9": "alpha clamp(0.03 / (1e-5 + (z/200)^4), 1e-2, 3e3)",
         Eq10 = "eq10": "alpha max(1e-2, 3e3 (1 - d)^3), d the stored depth as a fraction",
-        One = "one": "1: the plain mean by alpha (Bavoil and Myers 2008)",
+        One = "one": "1: the plain mean by alpha, as the colour of Bavoil and Myers 2008",
     }
 }
 
@@ -180,7 +180,7 @@ mod tests {
     fn weights_by_hand() {
         // At view depth 10: 10/(1e-5 + 4 + 1.5625e-8), 10/(1e-5 + 1 + …), and at a
         // depth of 1/2 of the range.
-        let depth = ViewDepth::new(10.0, 20.0, Lens::Parallel);
+        let depth = ViewDepth::new(10.0, 10.0, Lens::Parallel);
         let near = |weight: Weight| weight.of(&depth, Unorm32::NEAR, 0.5);
         assert!((near(Weight::Eq7) - 0.5 * 2.499_993_7).abs() < 1e-6);
         assert!((near(Weight::Eq8) - 0.5 * 9.999_899_9).abs() < 1e-5);
@@ -201,7 +201,7 @@ mod tests {
         // (2/3, 1/3, 0), the transmittance 3/8.
         let design = WeightedBlendedAt::<1> {
             weight: Weight::One,
-            depth: ViewDepth::new(1.0, 2.0, Lens::Parallel),
+            depth: ViewDepth::new(1.0, 1.0, Lens::Parallel),
             coverage: Coverage::Sample,
         };
         let mut pixel = Accumulators::default();

@@ -36,8 +36,9 @@ impl MomentCount {
 
     /// Moments drawn towards a measure of no extremes, and how far they are, so that
     /// rounding leaves a measure that exists: the bias and the even moments b_2, b_4, …
-    /// for single precision as Münstermann et al. give them in their supplement and in
-    /// the code that accompanies it.
+    /// for single precision. The moments are those of the code that Münstermann et al.
+    /// published. The biases are those of public ports of it, which for 4 moments refer
+    /// to the publication's supplement.
     fn bias(self) -> (f64, &'static [f64]) {
         match self {
             MomentCount::Four => (5e-7, &[0.375, 0.375]),

@@ -30,40 +30,46 @@ pub const LENS: Param =
 #[derive(Clone, Copy, Debug)]
 pub struct ViewDepth {
     near: f64,
-    far: f64,
+    range: f64,
     lens: Lens,
 }
 
 impl ViewDepth {
-    /// Between planes at view depths 0 < `near` < `far`.
-    pub fn new(near: f64, far: f64, lens: Lens) -> Self {
-        ViewDepth { near, far, lens }
+    /// From a near plane at view depth `near` > 0 over a `range` > 0.
+    pub fn new(near: f64, range: f64, lens: Lens) -> Self {
+        ViewDepth { near, range, lens }
     }
 
     /// As the parameters say.
     pub fn of(values: &Values) -> Self {
-        let near = values.real(NEAR.name);
-        Self::new(near, near + values.real(RANGE.name), values.choice(LENS.name))
+        Self::new(values.real(NEAR.name), values.real(RANGE.name), values.choice(LENS.name))
     }
 
     /// The view depth of `z`, between those of the two planes.
     #[inline]
     pub fn at(&self, z: Unorm32) -> f64 {
-        let (near, far, d) = (self.near, self.far, fraction(z));
-        match self.lens {
-            // d = f (z − n) / (z (f − n)), solved for z.
-            Lens::Perspective => near * far / (far - d * (far - near)),
-            Lens::Parallel => near + d * (far - near),
-        }
+        self.near + self.beyond_near(z)
     }
 
     /// The logarithm of the view depth of `z`, −1 at the near plane and 1 at the far.
     #[inline]
     pub fn log_warped(&self, z: Unorm32) -> f64 {
-        let share = libm::log(self.at(z) / self.near) / libm::log(self.far / self.near);
-        // No range to speak of has no logarithm to speak of.
-        let share = if share.is_finite() { share.clamp(0.0, 1.0) } else { fraction(z) };
-        2.0 * share - 1.0
+        let log = |beyond: f64| libm::log1p(beyond / self.near);
+        2.0 * (log(self.beyond_near(z)) / log(self.range)).clamp(0.0, 1.0) - 1.0
+    }
+
+    /// How far `z` lies beyond the near plane.
+    #[inline]
+    fn beyond_near(&self, z: Unorm32) -> f64 {
+        let d = fraction(z);
+        match self.lens {
+            // d = f (z − n) / (z (f − n)), solved for z − n so that nothing cancels.
+            Lens::Perspective => {
+                let far = self.near + self.range;
+                d * self.range * self.near / (far * (1.0 - d) + self.near * d)
+            }
+            Lens::Parallel => d * self.range,
+        }
     }
 }
 
@@ -80,12 +86,12 @@ mod tests {
     #[test]
     fn the_planes_stand_where_they_are_said_to() {
         for lens in [Lens::Perspective, Lens::Parallel] {
-            for (near, far) in [(0.1, 500.0), (1.0, 2.0), (1e6, 1e6 + 1e-3), (1e-3, 1e6)] {
-                let depth = ViewDepth { near, far, lens };
-                assert!((depth.at(Unorm32::NEAR) / near - 1.0).abs() < 1e-9);
-                assert!((depth.at(Unorm32::FAR) / far - 1.0).abs() < 1e-9);
-                assert!((depth.log_warped(Unorm32::NEAR) + 1.0).abs() < 1e-9);
-                assert!((depth.log_warped(Unorm32::FAR) - 1.0).abs() < 1e-3);
+            for (near, range) in [(0.1, 499.9), (1.0, 1.0), (1e6, 1e-3), (1e-3, 1e6)] {
+                let depth = ViewDepth::new(near, range, lens);
+                assert_eq!(depth.at(Unorm32::NEAR), near);
+                assert!((depth.at(Unorm32::FAR) / (near + range) - 1.0).abs() < 1e-9);
+                assert_eq!(depth.log_warped(Unorm32::NEAR), -1.0);
+                assert!((depth.log_warped(Unorm32::FAR) - 1.0).abs() < 1e-9);
             }
         }
     }
@@ -93,7 +99,7 @@ mod tests {
     #[test]
     fn a_perspective_depth_by_hand() {
         // n = 1, f = 4: z = 2 has depth 4·1/(2·3) = 2/3, and lies at ln 2/ln 4 = 1/2.
-        let depth = ViewDepth { near: 1.0, far: 4.0, lens: Lens::Perspective };
+        let depth = ViewDepth::new(1.0, 3.0, Lens::Perspective);
         let z = Unorm32((f64::from(u32::MAX) * 2.0 / 3.0) as u32);
         assert!((depth.at(z) - 2.0).abs() < 1e-8);
         assert!(depth.log_warped(z).abs() < 1e-8);

@@ -189,3 +189,24 @@ fn more_moments_are_nearer_on_many_layers() {
         assert!(all.is_sorted_by(|a, b| a * 1.1 < *b), "{all:?}");
     }
 }
+
+#[test]
+fn thousands_of_almost_opaque_layers_give_a_colour() {
+    let mut header = header(4, 4, 4);
+    header.background = [1.0; 3];
+    // At one depth, over the whole range, and at its ends.
+    let depths: [fn(u32) -> u32; 3] =
+        [|_| 7, |i| i.wrapping_mul(0x9e37_79b9), |i| (i % 2) * u32::MAX];
+    for depth in depths {
+        for alpha in [1e-30, 0.999_999_9] {
+            let fragments =
+                layered(&header, 2000, |i| (depth(i), [(i % 5) as f32 / 4.0; 3], alpha));
+            let trace = trace(&header, &fragments);
+            for design in all() {
+                let colour = picture(&design, &trace, 4, 0).get(1, 2);
+                let range = -1e-5..=1.0 + 1e-5;
+                assert!(colour.iter().all(|c| range.contains(c)), "{} {colour:?}", design.label());
+            }
+        }
+    }
+}
