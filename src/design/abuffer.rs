@@ -58,7 +58,7 @@ impl Blueprint for ABuffer {
                 Overflow::Furthest => OrderPromise::Independent,
                 Overflow::Newest | Overflow::Blend => OrderPromise::Dependent,
             },
-            exact_opaque: OpaquePromise::where_first(values),
+            exact_opaque: OpaquePromise::where_first(values, OpaquePromise::Never),
             seeded: false,
         }
     }

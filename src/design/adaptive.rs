@@ -52,7 +52,7 @@ impl Blueprint for Adaptive {
             consistent: false,
             // Which nodes are removed depends on what has come so far.
             order: OrderPromise::Dependent,
-            exact_opaque: OpaquePromise::where_first(values),
+            exact_opaque: OpaquePromise::where_first(values, OpaquePromise::Never),
             seeded: false,
         }
     }

@@ -35,7 +35,7 @@ impl Blueprint for Blend {
             unbiased: false,
             consistent: false,
             order: OrderPromise::Dependent,
-            exact_opaque: OpaquePromise::where_first(values),
+            exact_opaque: OpaquePromise::where_first(values, OpaquePromise::Never),
             seeded: false,
         }
     }

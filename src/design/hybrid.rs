@@ -38,7 +38,7 @@ impl Blueprint for Hybrid {
             // Which layers end in the core and which in the tail does not depend on the
             // order, but the tail's sums are rounded as they come.
             order: OrderPromise::UpToRounding,
-            exact_opaque: OpaquePromise::where_first(values),
+            exact_opaque: OpaquePromise::where_first(values, OpaquePromise::WholePixels),
             seeded: false,
         }
     }

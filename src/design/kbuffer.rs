@@ -37,7 +37,7 @@ impl Blueprint for KBuffer {
             unbiased: false,
             consistent: false,
             order: OrderPromise::Independent,
-            exact_opaque: OpaquePromise::where_first(values),
+            exact_opaque: OpaquePromise::where_first(values, OpaquePromise::WholePixels),
             seeded: false,
         }
     }

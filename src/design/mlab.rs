@@ -36,7 +36,7 @@ impl Blueprint for Mlab {
             consistent: false,
             // What comes between two that are already merged cannot part them.
             order: OrderPromise::Dependent,
-            exact_opaque: OpaquePromise::where_first(values),
+            exact_opaque: OpaquePromise::where_first(values, OpaquePromise::WholePixels),
             seeded: false,
         }
     }

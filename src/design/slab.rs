@@ -145,7 +145,7 @@ impl Blueprint for Slab {
                 (true, false) => OrderPromise::UpToRounding,
                 (false, _) => OrderPromise::Dependent,
             },
-            exact_opaque: OpaquePromise::where_first(values),
+            exact_opaque: OpaquePromise::where_first(values, OpaquePromise::Never),
             seeded: bits != 0,
         }
     }

@@ -51,7 +51,7 @@ impl Blueprint for SortedBlend {
             // Primitives of equal mean depth, and a primitive's own fragments in a
             // pixel, are blended as they come.
             order: OrderPromise::Dependent,
-            exact_opaque: OpaquePromise::where_first(values),
+            exact_opaque: OpaquePromise::where_first(values, OpaquePromise::Never),
             seeded: false,
         }
     }

@@ -78,7 +78,7 @@ impl Blueprint for WeightedBlended {
             unbiased: false,
             consistent: false,
             order: OrderPromise::UpToRounding,
-            exact_opaque: OpaquePromise::where_first(values),
+            exact_opaque: OpaquePromise::where_first(values, OpaquePromise::Never),
             seeded: false,
         }
     }

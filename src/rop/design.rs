@@ -59,7 +59,8 @@ impl Frame {
     ///
     /// # Panics
     /// Where `N` is not the frame's sample count.
-    #[inline]
+    // Not inlined: it would be unrolled into every design at every sample count.
+    #[inline(never)]
     pub fn depths<const N: usize>(&self, f: &Fragment, bits: u32) -> [Unorm32; N] {
         std::array::from_fn(|s| f.depth.at(self.positions[s]).narrowed(bits))
     }
@@ -221,12 +222,12 @@ pub enum OpaquePromise {
 }
 
 impl OpaquePromise {
-    /// The promise of a design that blends or sums what it draws, and so owes what is
-    /// exact to the z-buffer of [`OverOpaque`](crate::rop::OverOpaque).
-    pub fn where_first(values: &Values) -> Self {
+    /// The promise of a design that owes what is exact to the z-buffer of
+    /// [`OverOpaque`](crate::rop::OverOpaque), and has `otherwise` without it.
+    pub fn where_first(values: &Values, otherwise: OpaquePromise) -> Self {
         match over_opaque::of(values) {
             Opaque::First => OpaquePromise::Always,
-            Opaque::Together => OpaquePromise::Never,
+            Opaque::Together => otherwise,
         }
     }
 }

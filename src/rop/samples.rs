@@ -59,8 +59,8 @@ pub fn in_sample_order<const N: usize>(mask: SampleMask) -> SampleList<N> {
 }
 
 /// Sorts samples by increasing *stored* depth, equal depths in sample order
-/// (LK figure 7, line 9).
-#[inline]
+/// (LK figure 7, line 9). Not inlined: a sort is long, and the same for every design.
+#[inline(never)]
 pub fn sort_by_stored_depth<const N: usize>(list: &mut SampleList<N>, stored: &[Unorm32; N]) {
     list.sort_by_key(|s| (stored[usize::from(*s)], *s));
 }

@@ -172,7 +172,7 @@ pub fn promises(values: &Values, basic: Promises) -> Promises {
         },
         // By their depths alone, opaque fragments at equal depths are all seen.
         exact_opaque: match depth_based && together {
-            true => OpaquePromise::WholePixels,
+            true => OpaquePromise::Never,
             false => basic.exact_opaque,
         },
         ..basic

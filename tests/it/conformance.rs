@@ -126,14 +126,18 @@ fn opaque_fragments_give_the_exact_picture() {
             }
         }
     }
+    let mut wrong = Vec::new();
     for (design, broken) in all_variants().iter().zip(broken) {
         let found = match broken {
             [false, false] => OpaquePromise::Always,
             [_, false] => OpaquePromise::WholePixels,
             [_, true] => OpaquePromise::Never,
         };
-        assert_eq!(found, design.promises().exact_opaque, "{}", design.label());
+        if found != design.promises().exact_opaque {
+            wrong.push(format!("{} is exact {found:?}", design.label()));
+        }
     }
+    assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
 #[test]
@@ -218,6 +222,7 @@ fn crowded_depths(samples: u32) -> (screendoor::trace::Header, Vec<Fragment>) {
     let (_, mut fragments) = distinct_depths(samples);
     for (i, f) in fragments.iter_mut().enumerate() {
         (f.x, f.y) = (f.x % 4, f.y % 4);
+        f.depth.z.0 <<= 20;
         if i % 16 == 0 {
             f.coverage = SampleMask::first(samples);
         } else {
@@ -260,9 +265,11 @@ fn order_changes_the_picture_only_where_that_is_not_ruled_out() {
         let slight = |e: &Option<Errors>| e.as_ref().is_none_or(|e| e.max < ROUNDING);
         let found = match &changes {
             [None, None, None, None] => OrderPromise::Independent,
-            [None, ..] if changes.iter().all(slight) => OrderPromise::UpToRounding,
+            _ if changes.iter().all(slight) => OrderPromise::UpToRounding,
             // A quarter of an 8-bit step, where depths lie apart.
-            [None, wide, ..] if wide.as_ref().is_none_or(|e| e.rmse < 0.25) => {
+            [None, Some(wide), _, crowded]
+                if wide.rmse < 0.25 && crowded.as_ref().is_none_or(|e| e.rmse < 0.25) =>
+            {
                 OrderPromise::AmplifiedRounding
             }
             _ => OrderPromise::Dependent,

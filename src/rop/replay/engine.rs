@@ -126,7 +126,7 @@ struct Listener<'a>(Told<'a>);
 macro_rules! pass_on {
     ($($method:ident($($name:ident: $type:ty),*);)+) => {
         impl Probe for Listener<'_> {
-            $(#[inline]
+            $(#[inline(never)]
             fn $method(&mut self, $($name: $type),*) {
                 match &mut self.0 {
                     Told::Nobody => {}
