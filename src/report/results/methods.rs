@@ -44,7 +44,7 @@ fn examples(text: &mut String, m: &Methods) {
         .examples
         .iter()
         .filter(|row| row.printed.is_some_and(|p| off(p, row.exact.deviation)))
-        .map(|row| format!("{} of example {}", row.method, &row.example[..1]))
+        .map(|row| format!("{} of {}", row.method, &row.example[..5]))
         .collect();
     let _ = writeln!(
         text,
@@ -132,8 +132,8 @@ fn hashes(text: &mut String, m: &Methods) {
             vec![
                 format!("`{}`", h.reference),
                 if h.prehash { "yes" } else { "no" }.to_string(),
-                h.orders.to_string(),
-                h.low_orders.to_string(),
+                orders(h.orders),
+                orders(h.low_orders),
                 format!("{:.3}", h.between_surfaces),
                 format!("{:.3}", h.between_seeds),
                 format!("{:.4}", h.transmittance),
@@ -181,6 +181,11 @@ fn hashes(text: &mut String, m: &Methods) {
          the choice of the hash changes the picture's error by at most {:.1} %.\n",
         100.0 * (high / low - 1.0)
     );
+}
+
+/// A number of permutations; independent numbers form none.
+fn orders(count: usize) -> String {
+    if count > 1 << 15 { "—".to_string() } else { count.to_string() }
 }
 
 fn figure_8(text: &mut String, m: &Methods) {

@@ -77,7 +77,7 @@ pub struct BiasCase {
 fn example_1() -> Example {
     let (red, green, blue) = ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]);
     Example {
-        name: "1: red over green over blue, alpha 0.45",
+        name: "ex. 1: red over green over blue, alpha 0.45",
         layers: vec![(red, 0.45), (green, 0.45)],
         background: blue,
         samples: 4,
@@ -86,7 +86,7 @@ fn example_1() -> Example {
 
 fn example_2() -> Example {
     Example {
-        name: "2: four white layers, alpha 0.25, over 0.25 gray",
+        name: "ex. 2: four white layers, alpha 0.25, over 0.25 gray",
         layers: vec![([1.0; 3], 0.25); 4],
         background: [0.25; 3],
         samples: 4,
@@ -287,15 +287,15 @@ pub(super) fn bias_cases() -> Result<Vec<BiasCase>> {
         exact: two(enumerated(&pair, Masks::Stratified, corrected)),
         measured: two(measured(&pair, &spec(Masks::Stratified, corrected))?),
     });
+    let first = example_1();
     cases.push(BiasCase {
-        name: "depth-based, corrected, of the same two layers: E(D), biased and consistent"
-            .to_string(),
+        name: "depth-based, corrected, of example 1: E(D), where C = (0.45, 0.2475)".to_string(),
         printed: "not C",
-        exact: two(enumerated(&pair, Masks::Stratified, Method::DepthCorrection)),
-        measured: two(measured(&pair, &spec(Masks::Stratified, Method::DepthCorrection))?),
+        exact: two(enumerated(&first, Masks::Stratified, Method::DepthCorrection)),
+        measured: two(measured(&first, &spec(Masks::Stratified, Method::DepthCorrection))?),
     });
     cases.push(BiasCase {
-        name: "depth-based, uncorrected: E(U), unbiased".to_string(),
+        name: "depth-based, uncorrected, of two layers, alpha 1/4, S = 4: E(U)".to_string(),
         printed: "C",
         exact: two(enumerated(&pair, Masks::Stratified, Method::Depth)),
         measured: two(measured(&pair, &spec(Masks::Stratified, Method::Depth))?),
@@ -325,21 +325,24 @@ fn covered_total() -> Result<BiasCase> {
     })
 }
 
+/// More than white, but for the rounding of alphas in single precision.
+const BRIGHT: f64 = 1.0 + 1e-6;
+
 /// E section 4.2: U can exceed one.
 fn too_bright() -> Result<BiasCase> {
     let example = example_2();
     let mut above = 0.0;
     for_each_choice(&example, Masks::Stratified, |chosen, probability| {
-        let bright = colour(&example, chosen, Method::Depth)[0] > 1.0 + 1e-9;
+        let bright = colour(&example, chosen, Method::Depth)[0] > BRIGHT;
         above += if bright { probability } else { 0.0 };
     });
     let five = Example { layers: vec![([1.0; 3], 0.4); 5], background: [0.0; 3], ..example };
     let mut of_five = 0.0;
     for_each_choice(&five, Masks::Stratified, |chosen, probability| {
-        let bright = colour(&five, chosen, Method::Depth)[0] > 1.0 + 1e-9;
+        let bright = colour(&five, chosen, Method::Depth)[0] > BRIGHT;
         of_five += if bright { probability } else { 0.0 };
     });
-    let found = share(&five, Method::Depth, |white| white > 1.0 + 1e-6)?;
+    let found = share(&five, Method::Depth, |white| white > BRIGHT)?;
     Ok(BiasCase {
         name: "depth-based, uncorrected: U > 1, of five white layers, alpha 0.4, S = 4 \
                (and of example 2)"
