@@ -24,6 +24,7 @@ crate::options! {
         Auto = "auto": "standard up to 16 samples, nested for 32 and 64",
         Standard = "standard": "the patterns of Direct3D and Vulkan, 1 to 16 samples",
         Nested = "nested": "one pattern whose prefixes serve every smaller sample count",
+        Centre = "centre": "all samples at the pixel's centre: no antialiasing (Enderton et al. 2011, section 3.1)",
     }
 }
 
@@ -103,6 +104,11 @@ pub fn pattern(kind: PatternKind, samples: u32) -> Result<SamplePattern> {
         ));
     }
     let is_nested = match kind {
+        PatternKind::Centre => {
+            let positions = vec![[0, 0]; samples as usize];
+            let name = format!("centre-{samples}");
+            return Ok(SamplePattern { name, positions, nested: true });
+        }
         PatternKind::Auto => samples > 16,
         PatternKind::Standard if samples > 16 => {
             return Err(Error::config(

@@ -120,6 +120,11 @@ impl Entry {
         }
     }
 
+    /// Whether the design draws in an order that the application finds.
+    pub fn asks_for_primitive_depths(&self) -> bool {
+        self.primitive_depths
+    }
+
     /// The design with the settings `given` over its defaults.
     ///
     /// # Errors

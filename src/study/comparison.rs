@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use crate::capture::{Capture, CaptureOptions, Faces, Order};
+use crate::capture::{Capture, CaptureOptions, Faces, Order, PatternKind};
 use crate::design::{Configured, DESIGNS, Entry, REFERENCE, configure};
 use crate::error::Result;
 use crate::metrics::{Ensemble, EnsembleErrors, PixelClasses};
@@ -71,6 +71,8 @@ pub struct Contender {
     settings: Vec<(String, String)>,
     /// Parameters that follow the count, as (name, times the count).
     counted: Vec<(&'static str, u32)>,
+    /// Whether the application must sort for it.
+    pub sorted_by_application: bool,
     /// Whether it can do without a z-buffer for opaque fragments.
     opaque_apart: bool,
 }
@@ -114,6 +116,7 @@ impl Contender {
             name: entry.info.name,
             settings,
             counted,
+            sorted_by_application: entry.asks_for_primitive_depths(),
             opaque_apart: has(crate::rop::over_opaque::PARAM.name),
         }
     }
@@ -134,7 +137,7 @@ impl Contender {
 
 /// One contender at one count on one scene.
 #[derive(Clone, Debug, Serialize)]
-pub struct Result1 {
+pub struct Outcome {
     /// The contender's place in the list.
     pub contender: usize,
     /// Samples, and layers where it has layers.
@@ -149,7 +152,7 @@ pub struct Result1 {
     pub errors: EnsembleErrors,
 }
 
-impl Result1 {
+impl Outcome {
     /// Root of the mean square of each pixel's mean error, in 8-bit units: what no
     /// number of seeds removes.
     pub fn bias(&self) -> f64 {
@@ -165,19 +168,19 @@ pub struct ComparedScene {
     /// The trace in numbers.
     pub statistics: Statistics,
     /// Contender after contender, count after count.
-    pub results: Vec<Result1>,
+    pub results: Vec<Outcome>,
 }
 
 impl ComparedScene {
     /// A contender's result at a count.
-    pub fn result(&self, contender: usize, count: u32) -> Option<&Result1> {
+    pub fn result(&self, contender: usize, count: u32) -> Option<&Outcome> {
         self.results.iter().find(|r| r.contender == contender && r.count == count)
     }
 
     /// The least error of a contender with at most `bytes` of state per pixel.
-    pub fn best(&self, contender: usize, bytes: f64) -> Option<&Result1> {
+    pub fn best(&self, contender: usize, bytes: f64) -> Option<&Outcome> {
         let fits =
-            |r: &&Result1| r.contender == contender && !r.unbounded && r.state_bytes <= bytes;
+            |r: &&Outcome| r.contender == contender && !r.unbounded && r.state_bytes <= bytes;
         self.results
             .iter()
             .filter(fits)
@@ -196,9 +199,15 @@ pub struct Comparison {
     pub contenders: Vec<Contender>,
     /// On what.
     pub scenes: Vec<ComparedScene>,
+    /// The same scenes with all samples at the pixels' centres, as Enderton et al. and
+    /// Wyman show theirs; with the designs of [`SLAB_CLAIM`] alone.
+    pub without_antialiasing: Vec<ComparedScene>,
     /// Models that were not given.
     pub missing: Vec<&'static str>,
 }
+
+/// The designs that Wyman's claim is about.
+pub const SLAB_CLAIM: [&str; 3] = ["slab", "enderton", "kbuffer"];
 
 /// Compares all designs on the models in a folder, or on built-in scenes where no
 /// folder is given.
@@ -214,22 +223,33 @@ pub fn compare(
     let contenders = contenders();
     let specs: &[SceneSpec] = if models.is_some() { &MODELS } else { &BUILT_IN };
     let total = (specs.len() * contenders.len()) as u64;
-    let (mut scenes, mut missing) = (Vec::new(), Vec::new());
+    let (mut scenes, mut without_antialiasing) = (Vec::new(), Vec::new());
+    let mut missing = Vec::new();
     for (i, spec) in specs.iter().enumerate() {
-        let Some(trace) = spec.capture(models, side)? else {
+        let Some(trace) = spec.capture(models, side, PatternKind::Auto)? else {
             missing.push(spec.source);
             continue;
         };
         let before = (i * contenders.len()) as u64;
         let watch = |done: usize| progress(spec.name, before + done as u64, total);
-        scenes.push(compared(spec.name, &trace, &contenders, seeds, watch)?);
+        scenes.push(compared(spec.name, &trace, &contenders, |_| true, seeds, watch)?);
+        let claimed = |c: &Contender| SLAB_CLAIM.contains(&c.name);
+        if let Some(trace) = spec.capture(models, side, PatternKind::Centre)? {
+            let compared = compared(spec.name, &trace, &contenders, claimed, seeds, |_| ())?;
+            without_antialiasing.push(compared);
+        }
     }
-    Ok(Comparison { side, seeds, contenders, scenes, missing })
+    Ok(Comparison { side, seeds, contenders, scenes, without_antialiasing, missing })
 }
 
 impl SceneSpec {
     /// Its trace at 32 samples; `None` where the model is not there.
-    fn capture(&self, models: Option<&Path>, side: u32) -> Result<Option<Trace>> {
+    fn capture(
+        &self,
+        models: Option<&Path>,
+        side: u32,
+        pattern: PatternKind,
+    ) -> Result<Option<Trace>> {
         let in_folder = |file: &str| models.map(|m| m.join(file)).filter(|p| p.is_file());
         let source = match scene::path_of(self.source) {
             None => self.source.to_string(),
@@ -246,6 +266,7 @@ impl SceneSpec {
             width: side,
             height: side,
             samples: 32,
+            pattern,
             alpha: self.alpha,
             faces: Faces::Both,
             order: self.order,
@@ -259,6 +280,7 @@ fn compared(
     name: &'static str,
     trace: &Trace,
     contenders: &[Contender],
+    takes_part: impl Fn(&Contender) -> bool,
     seeds: u32,
     mut progress: impl FnMut(usize),
 ) -> Result<ComparedScene> {
@@ -272,7 +294,7 @@ fn compared(
         references.push((count, reference, PixelClasses::of(trace, count)?.covered));
     }
     let mut results = Vec::new();
-    for (contender, spec) in contenders.iter().enumerate() {
+    for (contender, spec) in contenders.iter().enumerate().filter(|(_, c)| takes_part(c)) {
         progress(contender);
         for (count, reference, covered) in &references {
             let design = spec.at(*count, has_opaque)?;
@@ -285,7 +307,7 @@ fn compared(
                 passes = replayed.passes;
             }
             let bits = design.state_bits(&Frame::of(trace, *count, 0)?)?;
-            results.push(Result1 {
+            results.push(Outcome {
                 contender,
                 count: *count,
                 state_bytes: f64::from(bits.total()) / 8.0,
