@@ -57,8 +57,10 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let watch = |done, total| progress.set(done, total);
     let mut explanation = design.explain(&trace, samples, seed, site, &watch)?;
     drop(progress);
-    let all = explanation.steps.len();
     let passes = explanation.steps.last().map_or(1, |step| step.pass + 1);
+    // A pass for opaque fragments does not look at the others.
+    explanation.steps.retain(|step| passes == 1 || !step.record.is_idle());
+    let all = explanation.steps.len();
     let left_out = arguments.last.map_or(0, |last| all.saturating_sub(last));
     let before = explanation.steps.drain(..left_out).next_back().map(|step| step.contents);
     let document = Document {

@@ -175,6 +175,16 @@ pub struct ReferenceRecord {
     pub passed: bool,
 }
 
+impl Record {
+    /// Whether nothing was done: a pass that does not look at the fragment.
+    pub fn is_idle(&self) -> bool {
+        self.samples_tested == 0
+            && self.written.is_empty()
+            && self.state_bits_read == 0
+            && self.state_bits_written == 0
+    }
+}
+
 impl Probe for Record {
     fn fragment(&mut self, covered: SampleMask) {
         self.covered = covered;
