@@ -35,7 +35,7 @@ pub(super) struct Arguments {
     #[arg(long, default_value_t = 800, value_name = "PIXELS", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(128..=4096))]
     side: u32,
     /// Frame side in pixels of the comparison of all designs
-    #[arg(long, default_value_t = 160, value_name = "PIXELS", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(32..=4096))]
+    #[arg(long, default_value_t = 128, value_name = "PIXELS", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(32..=4096))]
     comparison_side: u32,
     /// Measure only this part; the others stay in RESULTS.md as they are
     #[arg(long, value_name = "PART", value_parser = part)]
@@ -56,14 +56,14 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let folder = arguments.output.join("figures");
     std::fs::create_dir_all(&folder).map_err(|e| Error::io("create", &folder, e))?;
     let path = arguments.output.join("RESULTS.md");
+    // The work takes hours: that it can be written is found out before.
+    let mut file = OutputFile::create(&path)?;
+    drop(OutputFile::create(folder.join("figure.png"))?);
     let before = match std::fs::read_to_string(&path) {
         Ok(text) => text,
         Err(e) if e.kind() == io::ErrorKind::NotFound => String::new(),
         Err(e) => return Err(Error::io("read", &path, e)),
     };
-    // The work takes hours: that it can be written is found out before.
-    let mut file = OutputFile::create(&path)?;
-    drop(OutputFile::create(folder.join("figure.png"))?);
     let effort = Effort {
         seeds: arguments.seeds,
         seeds_of_means: arguments.seeds_of_means,

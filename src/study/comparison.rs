@@ -177,14 +177,17 @@ impl ComparedScene {
         self.results.iter().find(|r| r.contender == contender && r.count == count)
     }
 
-    /// The least error of a contender with at most `bytes` of state per pixel.
-    pub fn best(&self, contender: usize, bytes: f64) -> Option<&Outcome> {
-        let fits =
-            |r: &&Outcome| r.contender == contender && !r.unbounded && r.state_bytes <= bytes;
-        self.results
-            .iter()
-            .filter(fits)
-            .min_by(|a, b| a.errors.rmse.value.total_cmp(&b.errors.rmse.value))
+    /// A contender's error at a size of state between those of its counts: a line
+    /// between the logarithms of sizes and errors. `None` outside of them.
+    fn error_at(&self, contender: usize, bytes: f64) -> Option<f64> {
+        let own = |r: &&Outcome| r.contender == contender && !r.unbounded;
+        // Errors below this are rounding.
+        let point = |r: &Outcome| (r.state_bytes.ln(), r.errors.rmse.value.max(1e-3).ln());
+        let points: Vec<(f64, f64)> = self.results.iter().filter(own).map(point).collect();
+        let at = bytes.ln();
+        let (a, b) = points.iter().zip(points.get(1..)?).find(|(a, b)| a.0 <= at && at <= b.0)?;
+        let share = if b.0 > a.0 { (at - a.0) / (b.0 - a.0) } else { 0.0 };
+        Some((a.1 + share * (b.1 - a.1)).exp())
     }
 }
 
@@ -333,17 +336,16 @@ pub struct Duel {
 
 impl Comparison {
     /// Who of two has the smaller error with the same bytes of state: on each scene the
-    /// geometric mean of the errors' ratio over the budgets, which are the state sizes
-    /// of either that both can keep to, each with the best count that fits.
+    /// geometric mean of the errors' ratio over the state sizes of either that lie
+    /// between the least and the greatest of both.
     pub fn duel(&self, a: usize, b: usize) -> Duel {
         let mut duel = Duel::default();
         for scene in &self.scenes {
             let of_either = scene.results.iter().filter(|r| [a, b].contains(&r.contender));
             let logs: Vec<f64> = of_either
                 .filter_map(|r| {
-                    let error = |c| scene.best(c, r.state_bytes).map(|r| r.errors.rmse.value);
-                    // Errors below this are rounding.
-                    Some((error(a)?.max(1e-3) / error(b)?.max(1e-3)).ln())
+                    let error = |contender| scene.error_at(contender, r.state_bytes);
+                    Some((error(a)? / error(b)?).ln())
                 })
                 .collect();
             if logs.is_empty() {

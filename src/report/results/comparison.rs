@@ -189,9 +189,21 @@ fn slab(text: &mut String, c: &Comparison) {
             n => format!("on {n} of {}", scenes.len()),
         };
         row.push(verdict);
+        let bytes = |i| scenes.first().and_then(|s| s.result(i, 8)).map(|r| r.state_bytes);
+        let times = bytes(a).zip(bytes(b)).map(|(a, b)| format!("{:.1}", a / b));
+        row.push(times.unwrap_or_default());
         rows.push(row);
     }
-    let header = ["antialiasing", "design", "against", "8", "16", "32", "better than 32"];
+    let header = [
+        "antialiasing",
+        "design",
+        "against",
+        "8",
+        "16",
+        "32",
+        "better than 32",
+        "state ÷ that of 8 samples",
+    ];
     text.push_str(&markdown_table(&header, &rows));
     let _ = writeln!(
         text,
@@ -280,8 +292,8 @@ fn duels(text: &mut String, c: &Comparison) {
         "### Every pair at equal state\n\n\
          Scenes on which the row's design has the smaller error, and on which the column's has, with \
          the same bytes of state: the geometric mean of the ratio of their errors over the state \
-         sizes of either that both can keep to, each with the best count that fits; within 2 % \
-         neither wins. — where no state size suits both.\n"
+         sizes of either that lie within the range of both, errors between two counts \
+         interpolated; within 2 % neither wins. — where the ranges do not meet.\n"
     );
     let bounded: Vec<usize> = (0..c.contenders.len())
         .filter(|i| {
