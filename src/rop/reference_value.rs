@@ -174,6 +174,38 @@ mod tests {
     }
 
     #[test]
+    fn scrambles_give_the_values_of_their_published_formulas() {
+        // Computed outside of this program from the formulas as published.
+        const INPUTS: [(u32, u32); 4] = [(0, 0), (1, 0), (1 << 31, 1), (0xdead_beef, 0x1234_5678)];
+        for (reference, expected) in [
+            (Reference::Lk2011, [0, 0x3707_b665, 0xb707_b665, 0x023f_ba03]),
+            (Reference::VegdahlV2, [0x4534_cd0a, 0xa4e7_8b19, 0x24e7_8b19, 0x1aea_e043]),
+            (Reference::Vegdahl, [0, 0x3eae_f8dd, 0x3c7f_85ab, 0xabdb_6de7]),
+        ] {
+            assert_eq!(INPUTS.map(|(x, s)| reference.scramble(x, s)), expected, "{reference:?}");
+        }
+        let hashed = [0, 1, 2, 0xdead_beef].map(prehash);
+        assert_eq!(hashed, [0x9e7d_57dc, 0xe4fd_3835, 0x6eff_0c63, 0x0fa8_e141]);
+    }
+
+    #[test]
+    fn owen_scrambling_flips_each_node_of_the_tree_by_a_coin_of_its_own() {
+        // Two indices that first differ at a bit keep the order of all bits below, and
+        // the coins of one level are heads half the time: 6 sigma of 4096 draws.
+        for bit in [0, 3, 12] {
+            let mut heads = 0;
+            for i in 0..4096_u32 {
+                let x = i << bit;
+                let scrambled = Reference::Owen.scramble(x, 77);
+                let low = (1_u32 << bit) - 1;
+                assert_eq!(scrambled & low, Reference::Owen.scramble(x & low, 77) & low);
+                heads += (scrambled ^ x) >> (bit + 11) & 1;
+            }
+            assert!(heads.abs_diff(2048) < 6 * 32, "bit {bit}: {heads}");
+        }
+    }
+
+    #[test]
     fn the_radical_inverse_is_the_table_of_section_3() {
         let values: Vec<f64> = (0..8)
             .map(|n| {
