@@ -59,8 +59,10 @@ pub fn in_sample_order<const N: usize>(mask: SampleMask) -> SampleList<N> {
 }
 
 /// Sorts samples by increasing *stored* depth, equal depths in sample order
-/// (LK figure 7, line 9). Not inlined: a sort is long, and the same for every design.
-#[inline(never)]
+/// (LK figure 7, line 9).
+// As Frame::depths.
+#[cfg_attr(debug_assertions, inline(never))]
+#[cfg_attr(not(debug_assertions), inline)]
 pub fn sort_by_stored_depth<const N: usize>(list: &mut SampleList<N>, stored: &[Unorm32; N]) {
     list.sort_by_key(|s| (stored[usize::from(*s)], *s));
 }
