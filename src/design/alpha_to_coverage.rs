@@ -71,8 +71,4 @@ impl<const N: usize> Sampler<N> for FixedMask {
         const HALF: u32 = 1 << 31;
         passed & SampleMask::first(Threshold::of(fragment.alpha).of_many(N as u32, HALF))
     }
-
-    fn fields(&self, (): &()) -> Vec<(&'static str, String)> {
-        Vec::new()
-    }
 }

@@ -246,10 +246,6 @@ impl<const N: usize> Sampler<N> for EndertonSampler<N> {
         };
         chosen & passed
     }
-
-    fn fields(&self, (): &()) -> Vec<(&'static str, String)> {
-        Vec::new()
-    }
 }
 
 impl<const N: usize> EndertonSampler<N> {

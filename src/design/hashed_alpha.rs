@@ -156,10 +156,6 @@ impl<const N: usize> Sampler<N> for HashedThreshold {
             Each::Pixel => passed,
         }
     }
-
-    fn fields(&self, (): &()) -> Vec<(&'static str, String)> {
-        Vec::new()
-    }
 }
 
 #[cfg(test)]

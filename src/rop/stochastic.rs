@@ -27,6 +27,18 @@ crate::options! {
     }
 }
 
+impl Method {
+    /// Whether the picture is scaled to the total alpha.
+    pub fn corrected(self) -> bool {
+        matches!(self, Method::AlphaCorrection | Method::DepthCorrection)
+    }
+
+    /// Whether samples hold depths alone, and colours are added up in a pass of their own.
+    pub fn depth_based(self) -> bool {
+        matches!(self, Method::Depth | Method::DepthCorrection)
+    }
+}
+
 crate::options! {
     /// How often the samples are drawn.
     pub enum Rounds {
@@ -106,7 +118,9 @@ pub trait Sampler<const N: usize>: Send + Sync {
     ) -> SampleMask;
 
     /// Names and values of the state, for `explain`.
-    fn fields(&self, state: &Self::State) -> Vec<(&'static str, String)>;
+    fn fields(&self, _state: &Self::State) -> Vec<(&'static str, String)> {
+        Vec::new()
+    }
 }
 
 /// A stochastic design: a sampler and what is made of its choice.
@@ -160,18 +174,16 @@ pub fn single_pass<S: Sampler<N>, const N: usize>(
 /// equal depths as in front of each other, which matters where they overlap.
 pub fn promises(values: &Values, basic: Promises) -> Promises {
     let method: Method = values.choice(METHOD.name);
-    let corrected = matches!(method, Method::AlphaCorrection | Method::DepthCorrection);
     let together = over_opaque::of(values) == Opaque::Together;
     let sums = method != Method::Basic;
-    let depth_based = matches!(method, Method::Depth | Method::DepthCorrection);
     Promises {
-        unbiased: basic.unbiased && !corrected,
+        unbiased: basic.unbiased && !method.corrected(),
         order: match basic.order {
             OrderPromise::Independent if sums => OrderPromise::UpToRounding,
             order => order,
         },
         // By their depths alone, opaque fragments at equal depths are all seen.
-        exact_opaque: match depth_based && together {
+        exact_opaque: match method.depth_based() && together {
             true => OpaquePromise::Never,
             false => basic.exact_opaque,
         },
@@ -237,19 +249,11 @@ enum Pass {
 }
 
 impl<S: Sampler<N>, const N: usize> Methods<S, N> {
-    fn corrected(&self) -> bool {
-        matches!(self.method, Method::AlphaCorrection | Method::DepthCorrection)
-    }
-
-    fn depth_based(&self) -> bool {
-        matches!(self.method, Method::Depth | Method::DepthCorrection)
-    }
-
     fn pass(&self, pass: u32) -> Pass {
-        let Some(pass) = pass.checked_sub(u32::from(self.corrected())) else {
+        let Some(pass) = pass.checked_sub(u32::from(self.method.corrected())) else {
             return Pass::TotalAlpha;
         };
-        match self.depth_based() {
+        match self.method.depth_based() {
             true if pass % 2 == 1 => Pass::Accumulate(pass / 2),
             true => Pass::Sample(pass / 2),
             false => Pass::Sample(pass),
@@ -267,7 +271,7 @@ impl<S: Sampler<N>, const N: usize> Methods<S, N> {
 
     /// Bits that a written sample takes: the depth-based methods store no colours.
     fn sample_bits(&self) -> u32 {
-        self.depth_bits + if self.depth_based() { 0 } else { self.frame.colour_bits }
+        self.depth_bits + if self.method.depth_based() { 0 } else { self.frame.colour_bits }
     }
 
     fn draw_samples<P: Probe>(
@@ -329,8 +333,8 @@ impl<S: Sampler<N>, const N: usize> Transparent<N> for Methods<S, N> {
     type Pixel = MethodsPixel<S::State, N>;
 
     fn passes(&self) -> u32 {
-        let of_a_round = if self.depth_based() { 2 } else { 1 };
-        u32::from(self.corrected()) + self.rounds * of_a_round
+        let of_a_round = if self.method.depth_based() { 2 } else { 1 };
+        u32::from(self.method.corrected()) + self.rounds * of_a_round
     }
 
     fn state_bits(&self) -> StateBits {
@@ -342,7 +346,7 @@ impl<S: Sampler<N>, const N: usize> Transparent<N> for Methods<S, N> {
             // How often the sample stayed empty.
             Method::Depth => self.rounds.ilog2() + 1,
         };
-        let sums = if self.depth_based() || self.rounds > 1 { 4 * 32 } else { 0 };
+        let sums = if self.method.depth_based() || self.rounds > 1 { 4 * 32 } else { 0 };
         StateBits {
             samples: samples * self.sample_bits(),
             extra: self.sampler.state_bits() + samples * transmittance + sums,
@@ -353,7 +357,7 @@ impl<S: Sampler<N>, const N: usize> Transparent<N> for Methods<S, N> {
     fn clear(&self, site: Site) -> Self::Pixel {
         let several = self.method != Method::Basic || self.rounds > 1;
         let sums = Sums {
-            transmittance: [if self.corrected() { 1.0 } else { 0.0 }; N],
+            transmittance: [if self.method.corrected() { 1.0 } else { 0.0 }; N],
             occupied: SampleMask::NONE,
             colour: [0.0; 3],
             weight: 0.0,
@@ -386,7 +390,7 @@ impl<S: Sampler<N>, const N: usize> Transparent<N> for Methods<S, N> {
     /// Adds a finished round to the sums.
     fn end_pass(&self, pass: u32, site: Site, pixel: &mut Self::Pixel) {
         let MethodsPixel { samples, state, sums: Some(sums) } = pixel else { return };
-        let round = match (self.pass(pass), self.depth_based()) {
+        let round = match (self.pass(pass), self.method.depth_based()) {
             (Pass::Sample(round), false) | (Pass::Accumulate(round), true) => round,
             _ => return,
         };
@@ -424,7 +428,7 @@ impl<S: Sampler<N>, const N: usize> Transparent<N> for Methods<S, N> {
             let_through += f64::from(*t) / samples;
         }
         // The correction's factor, `C_α / F(B1)` or `C_α / F(U1)`, or none.
-        let factor = match self.corrected() {
+        let factor = match self.method.corrected() {
             false => mean,
             true if sums.weight > 0.0 => (1.0 - let_through) / f64::from(sums.weight),
             true => 0.0,

@@ -4,7 +4,6 @@
 
 use serde::Serialize;
 
-use crate::design::configure;
 use crate::error::Result;
 use crate::metrics::Estimate;
 use crate::rop::stochastic::Method;
@@ -153,7 +152,6 @@ const SEEDS: u32 = 16;
 
 /// Mean and deviation over the pixels of a frame, seed after seed.
 fn measured(example: &Example, spec: &str) -> Result<Moments> {
-    configure(spec, &[])?;
     let trace = whole_layers(SIDE, example.samples, example.background, &example.layers)?;
     let (mut sums, mut squares, mut count) = ([0.0; 3], [0.0; 3], 0.0);
     for seed in 0..SEEDS {
