@@ -14,7 +14,7 @@ use crate::error::Result;
 use crate::metrics::{Ensemble, EnsembleErrors, PixelClasses, Region};
 use crate::param::Values;
 use crate::picture::{Picture, PictureFile};
-use crate::rop::{EventCounts, Promises, ReplayOptions, Replayed, StateBits};
+use crate::rop::{EventCounts, Promises, ReplayOptions, Replayed, StateBits, Which};
 use crate::trace::Trace;
 
 /// Replay a trace through a design: a picture, its error, what the ROP did
@@ -84,6 +84,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let progress = console.progress("replaying", "fragments");
     let watch = |done, total| progress.set(done, total);
     let options = ReplayOptions {
+        engine: Which::Fast,
         count_events: true,
         window: arguments.window as usize,
         memory: arguments.memory << 20,

@@ -43,7 +43,7 @@ use crate::error::{Error, Result};
 use crate::param::{Values, parse_spec};
 use crate::rop::{
     Blueprint, Engine, Explanation, Frame, Info, PrimitiveDepths, Promises, ReplayOptions,
-    Replayed, Site, StateBits, explain, replay,
+    Replayed, Site, StateBits, Which, explain, replay,
 };
 use crate::trace::Trace;
 
@@ -79,7 +79,7 @@ pub struct Entry {
     /// What a listing says about it.
     pub info: Info,
     promises: fn(&Values) -> Promises,
-    build: fn(&Values, &Frame) -> Result<Box<dyn Engine>>,
+    build: fn(&Values, &Frame, Which) -> Result<Box<dyn Engine>>,
     /// Whether the frame must hold the primitives' mean depths.
     primitive_depths: bool,
 }
@@ -109,13 +109,23 @@ impl Entry {
         fn build_at<B: Blueprint, const N: usize>(
             values: &Values,
             frame: &Frame,
+            which: Which,
         ) -> Result<Box<dyn Engine>> {
-            Ok(Box::new(B::at::<N>(values, frame)?))
+            let fast = match which {
+                Which::Fast => B::fast::<N>(values, frame)?,
+                Which::Reference => None,
+            };
+            match fast {
+                Some(engine) => Ok(engine),
+                None => Ok(Box::new(B::at::<N>(values, frame)?)),
+            }
         }
         Entry {
             info: B::INFO,
             promises: B::promises,
-            build: |values, frame| for_samples!(frame.samples(), build_at::<B>(values, frame)),
+            build: |values, frame, which| {
+                for_samples!(frame.samples(), build_at::<B>(values, frame, which))
+            },
             primitive_depths: B::PRIMITIVE_DEPTHS,
         }
     }
@@ -183,7 +193,7 @@ impl Configured {
         options: &ReplayOptions<'_>,
     ) -> Result<Replayed> {
         let frame = self.frame(trace, samples, seed)?;
-        replay(&*self.build(&frame)?, &frame, trace, options)
+        replay(&*self.build(&frame, options.engine)?, &frame, trace, options)
     }
 
     /// Replays one pixel and writes down what happens.
@@ -206,7 +216,7 @@ impl Configured {
                 format_args!("it is {}x{} pixels", frame.grid.width(), frame.grid.height()),
             ));
         }
-        explain(&*self.build(&frame)?, &frame, trace, site, progress)
+        explain(&*self.build(&frame, Which::Reference)?, &frame, trace, site, progress)
     }
 
     /// State per pixel at the sample count of `frame`.
@@ -214,11 +224,14 @@ impl Configured {
     /// # Errors
     /// As [`Blueprint::at`].
     pub fn state_bits(&self, frame: &Frame) -> Result<StateBits> {
-        Ok(self.build(frame)?.state_bits())
+        Ok(self.build(frame, Which::Reference)?.state_bits())
     }
 
     /// The frame, with what the design asks to know of the whole trace beforehand.
-    fn frame(&self, trace: &Trace, samples: u32, seed: u32) -> Result<Frame> {
+    ///
+    /// # Errors
+    /// As [`Frame::of`] and [`Trace::batch`].
+    pub fn frame(&self, trace: &Trace, samples: u32, seed: u32) -> Result<Frame> {
         let mut frame = Frame::of(trace, samples, seed)?;
         if self.entry.primitive_depths {
             frame.primitive_depths = Some(Arc::new(PrimitiveDepths::of(trace)?));
@@ -227,8 +240,11 @@ impl Configured {
     }
 
     /// The design for the frame.
-    fn build(&self, frame: &Frame) -> Result<Box<dyn Engine>> {
-        (self.entry.build)(&self.values, frame)
+    ///
+    /// # Errors
+    /// As [`Blueprint::at`].
+    pub fn build(&self, frame: &Frame, which: Which) -> Result<Box<dyn Engine>> {
+        (self.entry.build)(&self.values, frame, which)
     }
 }
 

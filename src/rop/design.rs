@@ -9,6 +9,7 @@ use crate::param::{Param, Values};
 use crate::rop::event::Probe;
 use crate::rop::over_opaque::{self, Opaque};
 use crate::rop::primitive_depths::PrimitiveDepths;
+use crate::rop::replay::Engine;
 use crate::rop::samples::SampleContents;
 use crate::tile::TileGrid;
 use crate::trace::{ColourFormat, Fragment, Trace, Unorm32};
@@ -280,6 +281,15 @@ pub trait Blueprint: 'static {
     /// # Errors
     /// [`crate::error::Error::Config`] for values that contradict each other.
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>>;
+
+    /// A faster engine that gives the same bits, where there is one for these
+    /// parameters.
+    ///
+    /// # Errors
+    /// As [`Blueprint::at`].
+    fn fast<const N: usize>(_values: &Values, _frame: &Frame) -> Result<Option<Box<dyn Engine>>> {
+        Ok(None)
+    }
 
     /// What it promises with these parameters.
     fn promises(values: &Values) -> Promises;

@@ -39,8 +39,8 @@ pub use pixel_order::{PixelIndex, PixelOrder};
 pub use primitive_depths::PrimitiveDepths;
 pub use reference_value::{Reference, ReferenceKey, prehash, scramble_lk2011};
 pub use replay::{
-    Engine, Explanation, ReplayOptions, Replayed, Step, TileState, Told, draw_pixel, explain,
-    replay,
+    Engine, Explanation, ReplayOptions, Replayed, Step, TileState, Told, Which, draw_pixel,
+    explain, replay,
 };
 pub use samples::{SampleContents, SampleList, Samples, in_sample_order, sort_by_stored_depth};
 pub use stochastic::{Round, Sampler, Stochastic};

@@ -27,9 +27,19 @@ use crate::rop::replay::window::Windows;
 use crate::tile::TileMap;
 use crate::trace::Trace;
 
+crate::options! {
+    /// Which of a design's implementations draws; they give the same bits.
+    pub enum Which {
+        Fast = "fast": "the design's fast engine, where it has one",
+        Reference = "reference": "the plain text that says what the design is",
+    }
+}
+
 /// How to replay a trace; none of it changes the picture.
 #[derive(Clone, Copy)]
 pub struct ReplayOptions<'a> {
+    /// Which implementation draws.
+    pub engine: Which,
     /// Whether to count events.
     pub count_events: bool,
     /// Fragments that are binned at a time, at least 1.
@@ -43,6 +53,7 @@ pub struct ReplayOptions<'a> {
 impl Default for ReplayOptions<'_> {
     fn default() -> Self {
         ReplayOptions {
+            engine: Which::Fast,
             count_events: false,
             window: 1 << 19,
             memory: 1 << 29,
