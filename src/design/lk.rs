@@ -3,16 +3,21 @@
 //! The algorithm's text, after the paper's figures 4 and 7, is
 //! [`crate::rop::tracked`] with [`crate::rop::Reference`].
 
+use fearless_simd::Level;
+
 use crate::error::Result;
 use crate::param::Values;
+use crate::rop::fast::{
+    Count, FastEngine, FastTracked, Given, Published, PublishedHash, Width, is_published,
+};
 use crate::rop::stochastic::{self, COMBINATIONS, METHOD, OPAQUE, ROUNDS, STRATA};
 use crate::rop::tracked::{
     COMPACT, Hashed, PIXEL_ORDER, PREHASH, REFERENCE, SORT, SURFACES, TRACK, TrackedSampler,
     chance_decides_surfaces,
 };
 use crate::rop::{
-    Blueprint, Family, Frame, Info, OpaquePromise, OrderPromise, Promises, Reference, Stochastic,
-    depth_bits,
+    Blueprint, Engine, Family, Frame, Info, OpaquePromise, OrderPromise, Promises, Reference,
+    Stochastic, depth_bits,
 };
 
 /// The design's entry in the registry.
@@ -46,6 +51,24 @@ impl Blueprint for LaineKarras {
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
         let references = Hashed(values.choice(REFERENCE.name));
         stochastic::with_methods(values, frame, TrackedSampler::new(values, frame, references))
+    }
+
+    fn fast<const N: usize>(
+        values: &Values,
+        frame: &Frame,
+        level: Level,
+    ) -> Result<Option<Box<dyn Engine>>>
+    where
+        Count<N>: Width,
+    {
+        let plain = Self::at::<N>(values, frame)?;
+        if is_published(values) {
+            let sampler = FastTracked::<_, _, N>::new(values, Published, PublishedHash);
+            return Ok(Some(Box::new(FastEngine::new(plain, sampler, level))));
+        }
+        let references = Hashed(values.choice(REFERENCE.name));
+        let sampler = FastTracked::<_, _, N>::new(values, Given::of(values), references);
+        Ok(Some(Box::new(FastEngine::new(plain, sampler, level))))
     }
 
     fn promises(values: &Values) -> Promises {

@@ -41,6 +41,7 @@ pub use wboit::WeightedBlended;
 
 use crate::error::{Error, Result};
 use crate::param::{Values, parse_spec};
+use crate::rop::fast::{Count, Width};
 use crate::rop::{
     Blueprint, Engine, Explanation, Frame, Info, PrimitiveDepths, Promises, ReplayOptions,
     Replayed, Site, StateBits, Which, explain, replay,
@@ -110,10 +111,13 @@ impl Entry {
             values: &Values,
             frame: &Frame,
             which: Which,
-        ) -> Result<Box<dyn Engine>> {
-            let fast = match which {
-                Which::Fast => B::fast::<N>(values, frame)?,
-                Which::Reference => None,
+        ) -> Result<Box<dyn Engine>>
+        where
+            Count<N>: Width,
+        {
+            let fast = match which.level()? {
+                Some(level) => B::fast::<N>(values, frame, level)?,
+                None => None,
             };
             match fast {
                 Some(engine) => Ok(engine),

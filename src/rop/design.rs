@@ -2,11 +2,13 @@
 
 use std::sync::Arc;
 
+use fearless_simd::Level;
 use serde::Serialize;
 
 use crate::error::Result;
 use crate::param::{Param, Values};
 use crate::rop::event::Probe;
+use crate::rop::fast::{Count, Width};
 use crate::rop::over_opaque::{self, Opaque};
 use crate::rop::primitive_depths::PrimitiveDepths;
 use crate::rop::replay::Engine;
@@ -282,12 +284,19 @@ pub trait Blueprint: 'static {
     /// [`crate::error::Error::Config`] for values that contradict each other.
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>>;
 
-    /// A faster engine that gives the same bits, where there is one for these
-    /// parameters.
+    /// A faster engine that gives the same bits with the instructions of `level`, where
+    /// there is one for these parameters.
     ///
     /// # Errors
     /// As [`Blueprint::at`].
-    fn fast<const N: usize>(_values: &Values, _frame: &Frame) -> Result<Option<Box<dyn Engine>>> {
+    fn fast<const N: usize>(
+        _values: &Values,
+        _frame: &Frame,
+        _level: Level,
+    ) -> Result<Option<Box<dyn Engine>>>
+    where
+        Count<N>: Width,
+    {
         Ok(None)
     }
 

@@ -8,6 +8,9 @@ use crate::trace::{MAX_SAMPLES, SampleMask};
 /// Is told what a design does while it draws. The methods do nothing unless they
 /// are overridden: with [`NoProbe`] they vanish from the compiled code.
 pub trait Probe {
+    /// Whether anybody is told: where not, nothing need be worked out for it.
+    const LISTENS: bool = true;
+
     /// A fragment reached the pixel, covering these samples.
     fn fragment(&mut self, _covered: SampleMask) {}
     /// These of its samples were put to the depth test, and these passed it.
@@ -15,7 +18,13 @@ pub trait Probe {
     /// The fragment starts a new surface with this number.
     fn surface(&mut self, _number: u32) {}
     /// Samples were sorted; this is their order now.
-    fn sorted(&mut self, _order: &[u8]) {}
+    fn sorted(&mut self, order: &[u8]) {
+        self.sorted_many(order.len());
+    }
+    /// So many samples were sorted.
+    fn sorted_many(&mut self, _samples: usize) {}
+    /// All this happened.
+    fn many(&mut self, _events: &EventCounts) {}
     /// Sample `sample` got reference value `value` as the `number`-th of its
     /// surface and was held against `threshold`.
     fn reference(&mut self, _sample: u8, _number: u32, _value: u32, _threshold: Threshold) {}
@@ -31,7 +40,9 @@ pub trait Probe {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NoProbe;
 
-impl Probe for NoProbe {}
+impl Probe for NoProbe {
+    const LISTENS: bool = false;
+}
 
 /// How often each event happened over a replay.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -85,6 +96,12 @@ impl EventCounts {
 
     /// These counts and those of another part of the same replay.
     pub fn merged(mut self, other: &Self) -> Self {
+        self.add(other);
+        self
+    }
+
+    /// Adds the counts of another part of the same replay.
+    pub fn add(&mut self, other: &Self) {
         self.fragments += other.fragments;
         self.samples_tested += other.samples_tested;
         self.samples_passed += other.samples_passed;
@@ -96,11 +113,13 @@ impl EventCounts {
         self.surfaces += other.surfaces;
         self.state_bits_read += other.state_bits_read;
         self.state_bits_written += other.state_bits_written;
-        self
     }
 }
 
 impl Probe for EventCounts {
+    fn many(&mut self, events: &EventCounts) {
+        self.add(events);
+    }
     #[inline]
     fn fragment(&mut self, _covered: SampleMask) {
         self.fragments += 1;
@@ -115,9 +134,9 @@ impl Probe for EventCounts {
         self.surfaces += 1;
     }
     #[inline]
-    fn sorted(&mut self, order: &[u8]) {
-        if order.len() > 1 {
-            self.sorts_by_length[order.len()] += 1;
+    fn sorted_many(&mut self, samples: usize) {
+        if samples > 1 {
+            self.sorts_by_length[samples] += 1;
         }
     }
     #[inline]

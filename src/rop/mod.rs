@@ -7,6 +7,7 @@ pub mod depth_bits;
 mod design;
 mod dither;
 mod event;
+pub mod fast;
 pub mod layers;
 mod moments;
 mod normalise;

@@ -10,7 +10,7 @@ use crate::resolve::box_filter;
 use crate::rop::design::{Contents, Design, Frame, Site, StateBits};
 use crate::rop::event::Probe;
 use crate::rop::samples::Samples;
-use crate::trace::{Fragment, Unorm32};
+use crate::trace::{Fragment, SampleMask, Unorm32};
 
 crate::options! {
     /// How opaque fragments (alpha 1) are drawn by designs for transparent ones.
@@ -78,7 +78,7 @@ pub trait Transparent<const N: usize>: Send + Sync {
 pub struct OverOpaque<T, const N: usize> {
     frame: Frame,
     opaque: Opaque,
-    inner: T,
+    pub(in crate::rop) inner: T,
 }
 
 impl<T: Transparent<N>, const N: usize> OverOpaque<T, N> {
@@ -88,20 +88,57 @@ impl<T: Transparent<N>, const N: usize> OverOpaque<T, N> {
     }
 
     /// Passes over the trace before those of `inner`.
-    fn own_passes(&self) -> u32 {
+    pub(in crate::rop) fn own_passes(&self) -> u32 {
         u32::from(self.opaque == Opaque::First)
     }
 
     fn sample_bits(&self) -> u32 {
         32 + self.frame.colour_bits
     }
+
+    /// Where opaque fragments come first: the samples of a fragment that `inner` is to
+    /// draw in this pass, if there are any. An opaque fragment is drawn here.
+    #[inline]
+    pub(in crate::rop) fn cull<P: Probe>(
+        &self,
+        pass: u32,
+        opaque: &mut Option<Box<Samples<N>>>,
+        fragment: &Fragment,
+        probe: &mut P,
+    ) -> Option<SampleMask> {
+        let is_opaque = fragment.alpha >= 1.0;
+        if is_opaque != (pass == 0) {
+            return None;
+        }
+        let z: [Unorm32; N] = self.frame.depths(fragment, 32);
+        let passed = match opaque {
+            Some(samples) => samples.depth_test(fragment.coverage, &z),
+            None => fragment.coverage,
+        };
+        probe.depth_test(fragment.coverage, passed);
+        probe.state(32 * fragment.coverage.count(), 0);
+        if passed.is_empty() {
+            return None;
+        }
+        if !is_opaque {
+            return Some(passed);
+        }
+        let samples =
+            opaque.get_or_insert_with(|| Box::new(Samples::cleared(self.frame.background)));
+        for s in passed.iter() {
+            samples.write(s, z[s], fragment.colour);
+        }
+        probe.written(passed);
+        probe.state(0, self.sample_bits() * passed.count());
+        None
+    }
 }
 
 /// A pixel: opaque samples once there are any, and what lies over them.
 #[derive(Clone, Debug)]
 pub struct OverOpaquePixel<X, const N: usize> {
-    opaque: Option<Box<Samples<N>>>,
-    inner: X,
+    pub(in crate::rop) opaque: Option<Box<Samples<N>>>,
+    pub(in crate::rop) inner: X,
 }
 
 impl<T: Transparent<N>, const N: usize> Design for OverOpaque<T, N> {
@@ -135,31 +172,10 @@ impl<T: Transparent<N>, const N: usize> Design for OverOpaque<T, N> {
         if self.opaque == Opaque::Together {
             return self.inner.draw(pass, site, &mut pixel.inner, fragment, probe);
         }
-        let is_opaque = fragment.alpha >= 1.0;
-        if is_opaque != (pass == 0) {
-            return;
+        if let Some(coverage) = self.cull(pass, &mut pixel.opaque, fragment, probe) {
+            let fragment = Fragment { coverage, ..*fragment };
+            self.inner.draw(pass - 1, site, &mut pixel.inner, &fragment, probe);
         }
-        let z: [Unorm32; N] = self.frame.depths(fragment, 32);
-        let passed = match &pixel.opaque {
-            Some(samples) => samples.depth_test(fragment.coverage, &z),
-            None => fragment.coverage,
-        };
-        probe.depth_test(fragment.coverage, passed);
-        probe.state(32 * fragment.coverage.count(), 0);
-        if passed.is_empty() {
-            return;
-        }
-        if !is_opaque {
-            let fragment = Fragment { coverage: passed, ..*fragment };
-            return self.inner.draw(pass - 1, site, &mut pixel.inner, &fragment, probe);
-        }
-        let samples =
-            pixel.opaque.get_or_insert_with(|| Box::new(Samples::cleared(self.frame.background)));
-        for s in passed.iter() {
-            samples.write(s, z[s], fragment.colour);
-        }
-        probe.written(passed);
-        probe.state(0, self.sample_bits() * passed.count());
     }
 
     fn end_pass(&self, pass: u32, site: Site, pixel: &mut Self::Pixel) {

@@ -1,7 +1,7 @@
 //! Numbering the pixels of a frame.
 
 use crate::rop::design::Site;
-use crate::tile::TileGrid;
+use crate::tile::{TILE_PIXELS, TILE_SIDE, TileGrid, TileId};
 
 crate::options! {
     /// The curve along which pixels are numbered.
@@ -28,6 +28,43 @@ impl PixelOrder {
             PixelOrder::Scanline => (y << bits.min(16)).wrapping_add(x),
         })
     }
+
+    /// The numbers of a tile's pixels.
+    pub fn tile(self, tile: TileId, frame: TileGrid) -> [PixelIndex; TILE_PIXELS] {
+        let bits = frame.width().max(frame.height()).next_power_of_two().trailing_zeros();
+        let (x, y) = frame.pixel(tile, 0);
+        const LEVELS: u32 = TILE_SIDE.trailing_zeros();
+        if self != PixelOrder::Hilbert || bits < LEVELS {
+            return std::array::from_fn(|within| {
+                let (x, y) = frame.pixel(tile, within);
+                self.index(Site { x: x as u16, y: y as u16 }, frame)
+            });
+        }
+        // All pixels of a tile lie in the same quadrants down to the tile's level; below
+        // it, the curve may be mirrored.
+        let (mut left, mut top, mut distance) = (x, y, 0);
+        for bit in (LEVELS..bits).rev() {
+            distance = distance << 2 | quadrant(&mut left, &mut top, bit);
+        }
+        // What became of the corner's lower bits, all clear, and of its neighbours'.
+        let (mut right, mut below) = (x | 1, y);
+        for bit in (LEVELS..bits).rev() {
+            quadrant(&mut right, &mut below, bit);
+        }
+        let swapped = (left ^ right) & 1 == 0;
+        let inverted = left & 1 == 1;
+        std::array::from_fn(|within| {
+            let side = TILE_SIDE as u32;
+            let (mut x, mut y) = (within as u32 % side, within as u32 / side);
+            if swapped {
+                (x, y) = (y, x);
+            }
+            if inverted {
+                (x, y) = (!x, !y);
+            }
+            PixelIndex(distance << (2 * LEVELS) | hilbert(x, y, LEVELS))
+        })
+    }
 }
 
 /// The distance along the Hilbert curve of order `bits` that starts at (0, 0) and
@@ -35,19 +72,24 @@ impl PixelOrder {
 fn hilbert(mut x: u32, mut y: u32, bits: u32) -> u32 {
     let mut distance = 0;
     for bit in (0..bits).rev() {
-        let (right, down) = (x >> bit & 1, y >> bit & 1);
-        // The quadrants in the curve's order: 0 (left, up), 1 (left, down),
-        // 2 (right, down), 3 (right, up).
-        distance = distance << 2 | ((3 * right) ^ down);
-        // The first and the last quadrant hold the curve mirrored.
-        if down == 0 {
-            if right == 1 {
-                (x, y) = (!x, !y);
-            }
-            (x, y) = (y, x);
-        }
+        distance = distance << 2 | quadrant(&mut x, &mut y, bit);
     }
     distance
+}
+
+/// Which quadrant at level `bit` holds (`x`, `y`), in the curve's order: 0 (left, up),
+/// 1 (left, down), 2 (right, down), 3 (right, up). The coordinates' lower bits become
+/// those along the part of the curve that it holds.
+fn quadrant(x: &mut u32, y: &mut u32, bit: u32) -> u32 {
+    let (right, down) = (*x >> bit & 1, *y >> bit & 1);
+    // The first and the last quadrant hold the curve mirrored.
+    if down == 0 {
+        if right == 1 {
+            (*x, *y) = (!*x, !*y);
+        }
+        std::mem::swap(x, y);
+    }
+    (3 * right) ^ down
 }
 
 /// Puts a zero before each of the lower 16 bits.
@@ -110,6 +152,23 @@ mod tests {
             corners.sort_unstable();
             assert!(corners.windows(2).all(|w| w[0] < w[1]));
             assert_eq!((corners[0], corners[3] == u32::MAX), (0, true));
+        }
+    }
+
+    #[test]
+    fn a_tile_at_once_is_its_pixels_one_by_one() {
+        for side in [1, 8, 16, 40, 128, 200] {
+            let frame = TileGrid::new(side, side / 2 + 1);
+            for tile in (0..frame.count() as u32).map(TileId) {
+                for order in ORDERS {
+                    for (within, index) in order.tile(tile, frame).into_iter().enumerate() {
+                        let (x, y) = frame.pixel(tile, within);
+                        if frame.contains((x, y)) {
+                            assert_eq!(index, order.index(site(x, y), frame), "{order:?} {x},{y}");
+                        }
+                    }
+                }
+            }
         }
     }
 

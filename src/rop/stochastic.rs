@@ -200,31 +200,31 @@ pub fn strata_over_rounds(values: &Values) -> bool {
 /// Draws transparent fragments as a [`Method`] says.
 #[derive(Clone, Debug)]
 pub struct Methods<S, const N: usize> {
-    frame: Frame,
-    sampler: S,
-    depth_bits: u32,
-    method: Method,
-    rounds: u32,
+    pub(in crate::rop) frame: Frame,
+    pub(in crate::rop) sampler: S,
+    pub(in crate::rop) depth_bits: u32,
+    pub(in crate::rop) method: Method,
+    pub(in crate::rop) rounds: u32,
     strata: Strata,
 }
 
 /// A pixel of a stochastic design.
 #[derive(Clone, Debug)]
 pub struct MethodsPixel<T, const N: usize> {
-    samples: Samples<N>,
-    state: T,
+    pub(in crate::rop) samples: Samples<N>,
+    pub(in crate::rop) state: T,
     /// What several passes need; `None` for a single one.
-    sums: Option<Box<Sums<N>>>,
+    pub(in crate::rop) sums: Option<Box<Sums<N>>>,
 }
 
 /// What the methods of several passes keep.
 #[derive(Clone, Debug)]
-struct Sums<const N: usize> {
+pub(in crate::rop) struct Sums<const N: usize> {
     /// `1 − α_total` of each sample; without correction, the share of the rounds in
     /// which the sample stayed empty.
     transmittance: [f32; N],
     /// Samples written in this round.
-    occupied: SampleMask,
+    pub(in crate::rop) occupied: SampleMask,
     /// `Σ B` over the occupied samples, or `Σ U`, of all rounds so far.
     colour: [f32; 3],
     /// The same with colours replaced by 1.
@@ -242,14 +242,14 @@ impl<const N: usize> Sums<N> {
 
 /// What a pass over the trace does.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Pass {
+pub(in crate::rop) enum Pass {
     TotalAlpha,
     Sample(u32),
     Accumulate(u32),
 }
 
 impl<S: Sampler<N>, const N: usize> Methods<S, N> {
-    fn pass(&self, pass: u32) -> Pass {
+    pub(in crate::rop) fn pass(&self, pass: u32) -> Pass {
         let Some(pass) = pass.checked_sub(u32::from(self.method.corrected())) else {
             return Pass::TotalAlpha;
         };
@@ -260,7 +260,7 @@ impl<S: Sampler<N>, const N: usize> Methods<S, N> {
         }
     }
 
-    fn round(&self, round: u32) -> Round {
+    pub(in crate::rop) fn round(&self, round: u32) -> Round {
         let seed = self.frame.seed;
         match self.strata {
             Strata::All => Round { index: round, count: self.rounds, seed },
@@ -270,7 +270,7 @@ impl<S: Sampler<N>, const N: usize> Methods<S, N> {
     }
 
     /// Bits that a written sample takes: the depth-based methods store no colours.
-    fn sample_bits(&self) -> u32 {
+    pub(in crate::rop) fn sample_bits(&self) -> u32 {
         self.depth_bits + if self.method.depth_based() { 0 } else { self.frame.colour_bits }
     }
 
@@ -302,7 +302,12 @@ impl<S: Sampler<N>, const N: usize> Methods<S, N> {
     }
 
     /// E equation 5: the product of what the fragments let through.
-    fn draw_alpha<P: Probe>(&self, sums: &mut Sums<N>, fragment: &Fragment, probe: &mut P) {
+    pub(in crate::rop) fn draw_alpha<P: Probe>(
+        &self,
+        sums: &mut Sums<N>,
+        fragment: &Fragment,
+        probe: &mut P,
+    ) {
         for s in fragment.coverage.iter() {
             sums.transmittance[s] *= 1.0 - fragment.alpha;
         }
@@ -311,17 +316,15 @@ impl<S: Sampler<N>, const N: usize> Methods<S, N> {
     }
 
     /// E equations 4 and 6: the fragment, weighed by the share of the samples that it
-    /// lies not behind.
-    fn accumulate<P: Probe>(
+    /// lies not behind, the `visible` ones.
+    pub(in crate::rop) fn accumulate<P: Probe>(
         &self,
-        pixel: &mut MethodsPixel<S::State, N>,
+        sums: &mut Sums<N>,
         fragment: &Fragment,
+        visible: SampleMask,
         probe: &mut P,
     ) {
-        let z: [Unorm32; N] = self.frame.depths(fragment, self.depth_bits);
-        let visible = pixel.samples.depth_test(fragment.coverage, &z);
         probe.depth_test(fragment.coverage, visible);
-        let sums = pixel.sums.as_mut().expect("it has sums");
         sums.add(fragment.colour, fragment.alpha * visible.count() as f32);
         probe.written(visible);
         // One sum a pixel: with a box filter it holds what a multisample buffer would.
@@ -380,7 +383,16 @@ impl<S: Sampler<N>, const N: usize> Transparent<N> for Methods<S, N> {
     ) {
         match self.pass(pass) {
             Pass::Sample(round) => self.draw_samples(round, site, pixel, fragment, probe),
-            Pass::Accumulate(_) => self.accumulate(pixel, fragment, probe),
+            Pass::Accumulate(_) => {
+                let z: [Unorm32; N] = self.frame.depths(fragment, self.depth_bits);
+                let visible = pixel.samples.depth_test(fragment.coverage, &z);
+                self.accumulate(
+                    pixel.sums.as_mut().expect("it has sums"),
+                    fragment,
+                    visible,
+                    probe,
+                );
+            }
             Pass::TotalAlpha => {
                 self.draw_alpha(pixel.sums.as_mut().expect("it has sums"), fragment, probe);
             }

@@ -36,9 +36,9 @@ pub struct SurfaceTracker {
     /// How many samples of the current surface have been numbered. Where only
     /// numbered samples are held this is the number of bits in `covered`, and no
     /// state of its own.
-    numbered: u32,
+    pub(in crate::rop) numbered: u32,
     /// The primitive or object that drew last, where the rule asks; plus one.
-    last: Option<u32>,
+    pub(in crate::rop) last: Option<u32>,
 }
 
 impl SurfaceTracker {

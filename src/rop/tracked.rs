@@ -111,14 +111,14 @@ pub fn chance_decides_surfaces(values: &Values) -> bool {
 /// Figure 7 with any reference values, for pixels of `N` samples.
 #[derive(Clone, Debug)]
 pub struct TrackedSampler<R, const N: usize> {
-    grid: TileGrid,
-    sort: bool,
-    compact: bool,
-    surfaces: SurfaceRule,
-    track: Tracked,
-    pixel_order: PixelOrder,
-    prehash: bool,
-    references: R,
+    pub(in crate::rop) grid: TileGrid,
+    pub(in crate::rop) sort: bool,
+    pub(in crate::rop) compact: bool,
+    pub(in crate::rop) surfaces: SurfaceRule,
+    pub(in crate::rop) track: Tracked,
+    pub(in crate::rop) pixel_order: PixelOrder,
+    pub(in crate::rop) prehash: bool,
+    pub(in crate::rop) references: R,
 }
 
 impl<R, const N: usize> TrackedSampler<R, N> {
@@ -143,11 +143,11 @@ impl<R, const N: usize> TrackedSampler<R, N> {
 /// What figure 7 keeps of a pixel, `p`, beside its samples.
 #[derive(Clone, Debug)]
 pub struct TrackedState<K> {
-    surface: SurfaceTracker,
+    pub(in crate::rop) surface: SurfaceTracker,
     /// `p.pixelId`: follows from where the pixel lies, so it is no state.
-    pixel_id: PixelIndex,
+    pub(in crate::rop) pixel_id: PixelIndex,
     /// What the reference values keep.
-    kept: K,
+    pub(in crate::rop) kept: K,
 }
 
 impl<R: References, const N: usize> Sampler<N> for TrackedSampler<R, N> {

@@ -13,15 +13,17 @@ mod explain;
 mod group;
 mod window;
 
+use fearless_simd::Level;
 use rayon::prelude::*;
 
 pub use engine::{Engine, TileState, Told};
 pub use explain::{Explanation, Step, draw_pixel, explain};
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::picture::{Picture, TilePixels};
 use crate::rop::design::{Frame, StateBits};
 use crate::rop::event::EventCounts;
+use crate::rop::fast::levels;
 use crate::rop::replay::group::{Group, group_tiles};
 use crate::rop::replay::window::Windows;
 use crate::tile::TileMap;
@@ -30,8 +32,41 @@ use crate::trace::Trace;
 crate::options! {
     /// Which of a design's implementations draws; they give the same bits.
     pub enum Which {
-        Fast = "fast": "the design's fast engine, where it has one",
+        Fast = "fast": "the design's fast engine, where it has one, with what the machine has",
+        Avx512 = "avx512": "the same with AVX-512 (x86)",
+        Avx2 = "avx2": "the same with AVX2 (x86)",
+        Sse2 = "sse2": "the same with SSE2 (x86)",
+        Neon = "neon": "the same with NEON (ARM)",
+        Portable = "portable": "the same without vector instructions of its own",
         Reference = "reference": "the plain text that says what the design is",
+    }
+}
+
+impl Which {
+    /// The instruction set of a fast engine; `None` for the reference.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] where this machine lacks it.
+    pub fn level(self) -> Result<Option<Level>> {
+        let name = match self {
+            // Without vector instructions the plain text is the faster one.
+            Which::Fast => return Ok(Some(Level::new()).filter(|level| !level.is_fallback())),
+            Which::Portable => return Ok(Some(Level::fallback())),
+            Which::Reference => return Ok(None),
+            Which::Avx512 => "Avx512",
+            Which::Avx2 => "Avx2",
+            Which::Sse2 => "Sse2",
+            Which::Neon => "Neon",
+        };
+        let found = levels().into_iter().find(|level| format!("{level:?}").starts_with(name));
+        match found {
+            Some(level) => Ok(Some(level)),
+            None => Err(Error::unsupported(
+                format_args!("the engine with {name}"),
+                "this machine does not have these instructions",
+                "choose 'fast', which takes what the machine has",
+            )),
+        }
     }
 }
 

@@ -1,0 +1,174 @@
+//! Numbering a fragment's samples in the order of their stored depths.
+
+use fearless_simd::Simd;
+
+use crate::rop::fast::lanes::Lanes;
+
+/// The number that a lane would have if it came last: ranks are counted down from
+/// here, so that they are shifts that bring a bit to the front.
+const LAST: i32 = 31;
+
+/// For each lane of `among`, 31 minus how many others of `among` come before it: those
+/// whose key is smaller, and of equal keys the earlier lanes. Modulo 2^32; the other
+/// lanes hold anything.
+///
+/// Keys of `among` must exceed `i32::MIN + 1`: the least ones mark what is not among
+/// them.
+#[inline(always)]
+pub fn ranks<S: Simd, L: Lanes<S>>(simd: S, keys: L, words: &[i32], among: u64) -> L {
+    if L::LEN <= 8 { of_all(simd, keys, among) } else { one_by_one(simd, keys, words, among) }
+}
+
+/// Every lane against every other one, without a branch.
+#[inline(always)]
+fn of_all<S: Simd, L: Lanes<S>>(simd: S, keys: L, among: u64) -> L {
+    let less = keys.sub(L::splat(simd, 1));
+    // What is not among them comes before everybody, and is taken off again.
+    let others = L::select(L::mask(simd, among), less, L::splat(simd, i32::MIN));
+    let outside = L::LEN as i32 - among.count_ones() as i32;
+    let mut ranks = L::splat(simd, LAST + outside);
+    let mut words = [0; 8];
+    others.store(&mut words[..L::LEN]);
+    for (j, word) in words[..L::LEN].iter().enumerate() {
+        // Lanes behind lane `j` come after it where keys are equal, too.
+        let behind = L::mask(simd, !0 << j << 1);
+        let mine = L::select(behind, keys, less);
+        ranks = ranks.less_one_where_greater(mine, L::splat(simd, *word));
+    }
+    ranks
+}
+
+/// Every lane against those of `among`, one after the other.
+#[inline(always)]
+fn one_by_one<S: Simd, L: Lanes<S>>(simd: S, keys: L, words: &[i32], among: u64) -> L {
+    // A window of as many words over this list: one in the lanes behind lane `j`.
+    const LATER: [i32; 128] = {
+        let mut list = [0; 128];
+        let mut i = 64;
+        while i < 128 {
+            list[i] = 1;
+            i += 1;
+        }
+        list
+    };
+    let mut ranks = L::splat(simd, LAST);
+    let mut left = among;
+    while left != 0 {
+        let j = left.trailing_zeros() as usize % L::LEN;
+        left &= left - 1;
+        let later = L::load(simd, &LATER[63 - j..][..L::LEN]);
+        let other = L::splat(simd, words[j]).sub(later);
+        ranks = ranks.less_one_where_greater(keys, other);
+    }
+    ranks
+}
+
+/// [`ranks`] in the order of the lanes.
+#[inline(always)]
+pub fn in_sample_order<S: Simd, L: Lanes<S>>(simd: S, among: u64) -> L {
+    L::splat(simd, LAST).sub(L::numbered(simd, among))
+}
+
+/// The lanes of `among` whose bit in `hits` is set, the bit of the one that comes
+/// first the lowest.
+#[inline(always)]
+pub fn picked<S: Simd, L: Lanes<S>>(simd: S, hits: u64, ranks: L, among: L::Mask) -> L::Mask {
+    let mut bits = L::splat(simd, hits as u32 as i32);
+    if L::LEN > 32 {
+        // Counted down from 31, the numbers from 32 on are negative.
+        let upper = L::splat(simd, (hits >> 32) as u32 as i32);
+        bits = L::select(ranks.negative(simd), upper, bits);
+    }
+    L::both(bits.shift_left_by(ranks).negative(simd), among)
+}
+
+#[cfg(test)]
+mod tests {
+    use fearless_simd::Level;
+
+    use super::*;
+    use crate::random::Stream;
+    use crate::rop::fast::lanes::{Count, Width, levels};
+
+    /// Which lanes are picked, by the vectors and by sorting.
+    fn both_ways<const N: usize>(
+        level: Level,
+        keys: &[i32; N],
+        among: u64,
+        hits: u64,
+        sort: bool,
+    ) -> [u64; 2]
+    where
+        Count<N>: Width,
+    {
+        #[inline(always)]
+        fn vectors<S: Simd, W: Width>(
+            simd: S,
+            words: &[i32],
+            among: u64,
+            hits: u64,
+            sort: bool,
+        ) -> u64 {
+            let keys = <W::Lanes<S> as Lanes<S>>::load(simd, words);
+            let ranks =
+                if sort { ranks(simd, keys, words, among) } else { in_sample_order(simd, among) };
+            let among = <W::Lanes<S> as Lanes<S>>::mask(simd, among);
+            <W::Lanes<S> as Lanes<S>>::bits(picked(simd, hits, ranks, among))
+        }
+        fn dispatched<W: Width>(
+            level: Level,
+            words: &[i32],
+            among: u64,
+            hits: u64,
+            sort: bool,
+        ) -> u64 {
+            crate::for_level!(level, simd => vectors::<_, W>(simd, words, among, hits, sort))
+        }
+        let row = Count::<N>::row(|i| keys.get(i).copied().unwrap_or(0));
+        let mut order: Vec<usize> = (0..N).filter(|i| among >> i & 1 == 1).collect();
+        if sort {
+            order.sort_by_key(|i| (keys[*i], *i));
+        }
+        let chosen = order.iter().enumerate().filter(|(n, _)| hits >> n & 1 == 1);
+        let expected = chosen.fold(0, |mask, (_, i)| mask | 1 << i);
+        [dispatched::<Count<N>>(level, row.as_ref(), among, hits, sort), expected]
+    }
+
+    fn check<const N: usize>()
+    where
+        Count<N>: Width,
+    {
+        let mut random = Stream::new([N as u32]);
+        for case in 0..400 {
+            // From all equal to all different, and the ends of the range.
+            let kinds = 1 + random.below(1 << (case % 9));
+            let keys: [i32; N] = std::array::from_fn(|_| match random.below(kinds) {
+                0 => i32::MAX,
+                1 => i32::MIN + 2,
+                other => (other as i32).wrapping_mul(0x1234_5677) | 1 << 8,
+            });
+            let word = |r: &mut Stream| u64::from(r.word()) << 32 | u64::from(r.word());
+            let all = u64::MAX >> (64 - N);
+            let among = [all, word(&mut random) & all, 1 << random.below(N as u32), 0]
+                [random.below(4) as usize];
+            let hits = word(&mut random);
+            for level in levels() {
+                for sort in [true, false] {
+                    let [fast, plain] = both_ways(level, &keys, among, hits, sort);
+                    assert_eq!(fast, plain, "{level:?} {sort} {keys:?} {among:#x} {hits:#x}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn ranks_are_those_of_sorting_at_every_count_and_level() {
+        check::<1>();
+        check::<2>();
+        check::<4>();
+        check::<8>();
+        check::<16>();
+        check::<32>();
+        check::<64>();
+    }
+}
