@@ -1,10 +1,18 @@
 //! The exact answer: every sample's fragments sorted and composited.
 
+mod fast;
+mod lanes;
+#[cfg(test)]
+mod tests;
+
+use fearless_simd::Level;
+
+use crate::design::exact::fast::Fast;
 use crate::error::Result;
 use crate::param::Values;
 use crate::rop::{
-    Blueprint, Contents, Design, Family, Frame, Info, OpaquePromise, OrderPromise, Probe, Promises,
-    Site, StateBits,
+    Blueprint, Contents, Design, Engine, Family, Frame, Info, OpaquePromise, OrderPromise, Probe,
+    Promises, Site, StateBits,
 };
 use crate::trace::{DepthPlane, Fragment, SampleMask};
 
@@ -25,6 +33,11 @@ impl Blueprint for Exact {
 
     fn at<const N: usize>(_: &Values, frame: &Frame) -> Result<ExactAt<N>> {
         Ok(ExactAt { frame: frame.clone() })
+    }
+
+    fn fast<const N: usize>(values: &Values, frame: &Frame) -> Result<Option<Box<dyn Engine>>> {
+        let reference = Box::new(Self::at::<N>(values, frame)?);
+        Ok(Some(Box::new(Fast::new(frame, reference, Level::new()))))
     }
 
     fn promises(_: &Values) -> Promises {
