@@ -2,10 +2,10 @@
 //! sample, and composited at eight samples at once. Samples at which that order
 //! proves wrong are sorted on their own.
 
-use fearless_simd::{Level, Simd, dispatch, i32x16, prelude::*};
+use fearless_simd::{Level, Simd, dispatch};
 
 use crate::design::exact::lanes::{Composite, Depths, LANES, Offsets, Row, covers, depth_at, row};
-use crate::picture::TilePixels;
+use crate::design::exact::order::{CHUNK, insert_in_order, keep, rank, shorten};
 use crate::rop::{Contents, Engine, Frame, StateBits, TileState, Told};
 use crate::tile::{TILE_PIXELS, TileGrid, TileId};
 use crate::trace::{DepthPlane, Fragment, SampleMask};
@@ -18,6 +18,9 @@ pub struct Fast {
     reference: Box<dyn Engine>,
     level: Level,
 }
+
+/// The colours of a tile's pixels.
+type Pixels = [[f64; 3]; TILE_PIXELS];
 
 /// What is kept of a fragment; a tile keeps all its pixels' in one list.
 #[derive(Clone, Copy)]
@@ -72,7 +75,7 @@ impl Engine for Fast {
 
     fn end_pass(&self, _pass: u32, _grid: TileGrid, _tile: TileId, _state: &mut TileState) {}
 
-    fn resolve(&self, _grid: TileGrid, _tile: TileId, state: &TileState) -> TilePixels {
+    fn resolve(&self, _grid: TileGrid, _tile: TileId, state: &TileState) -> Box<Pixels> {
         let layers = state.downcast_ref::<Vec<Layer>>().expect("the state is the engine's own");
         dispatch!(self.level, simd => resolve(simd, &self.frame, layers))
     }
@@ -85,7 +88,7 @@ impl Engine for Fast {
 }
 
 #[inline(always)]
-fn resolve<S: Simd>(simd: S, frame: &Frame, layers: &[Layer]) -> TilePixels {
+fn resolve<S: Simd>(simd: S, frame: &Frame, layers: &[Layer]) -> Box<Pixels> {
     let mut result = Box::new([[0.0; 3]; TILE_PIXELS]);
     let background = frame.background.map(f64::from);
     let mut keys = vec![0; layers.len()];
@@ -134,9 +137,6 @@ fn add_samples(sum: &mut [f64; 3], colours: &[[f64; LANES]; 3], count: usize) {
         colours[..count].iter().for_each(|c| *sum += c);
     }
 }
-
-/// Layers that are handed to the lanes at a time.
-const CHUNK: usize = 128;
 
 /// Room that all pixels use in turn.
 struct Scratch {
@@ -272,61 +272,5 @@ impl Block<'_> {
             transmittance *= 1.0 - alpha;
         }
         std::array::from_fn(|i| colour[i] + transmittance * self.background[i])
-    }
-}
-
-/// Up to [`CHUNK`] keys, which stand in API order, cut to 32 bits in `short`; padded
-/// with large ones.
-#[inline(always)]
-fn shorten<'a>(keys: &[u64], short: &'a mut [i32; CHUNK]) -> &'a [i32] {
-    let padded = &mut short[..keys.len().next_multiple_of(RANKED)];
-    for (i, (short, key)) in padded.iter_mut().zip(keys).enumerate() {
-        let depth = (key >> 32) as u32 / CHUNK as u32;
-        let key = depth * CHUNK as u32 + (CHUNK - 1 - i) as u32;
-        // Signed, which all instruction sets compare.
-        *short = (key ^ 1 << 31) as i32;
-    }
-    padded[keys.len()..].fill(i32::MAX);
-    padded
-}
-
-/// Keys that are compared at a time.
-const RANKED: usize = 16;
-
-/// How many of the keys are smaller: the place of this one when they are sorted, but
-/// that of depths that differ in their last bits only the later one comes first;
-/// whether the order is right is found out when the layers are composited. This takes
-/// more comparisons than a sort, but sixteen at a time, and none to be guessed.
-#[inline(always)]
-fn rank<S: Simd>(simd: S, key: i32, short: &[i32]) -> usize {
-    let key = i32x16::splat(simd, key);
-    let mut rank = 0;
-    for keys in short.chunks_exact(RANKED) {
-        rank += i32x16::from_slice(simd, keys).simd_lt(key).to_bitmask().count_ones();
-    }
-    rank as usize
-}
-
-/// Keeps the keys that are marked, without a branch that would be taken at random.
-#[inline(always)]
-fn keep(keys: impl Iterator<Item = (u64, bool)>, kept: &mut Vec<u64>) {
-    let mut count = 0;
-    for (key, keep) in keys {
-        kept[count] = key;
-        count += usize::from(keep);
-    }
-    kept.truncate(count);
-}
-
-/// Sorts keys of which few are out of place.
-fn insert_in_order(keys: &mut [u64]) {
-    for end in 1..keys.len() {
-        let key = keys[end];
-        let mut place = end;
-        while place > 0 && keys[place - 1] > key {
-            keys[place] = keys[place - 1];
-            place -= 1;
-        }
-        keys[place] = key;
     }
 }

@@ -2,8 +2,7 @@
 
 mod fast;
 mod lanes;
-#[cfg(test)]
-mod tests;
+mod order;
 
 use fearless_simd::Level;
 
@@ -135,3 +134,6 @@ impl<const N: usize> Design for ExactAt<N> {
         Some(2 * size_of::<Layer>())
     }
 }
+
+#[cfg(test)]
+mod tests;
