@@ -8,7 +8,7 @@ use crate::rop::design::{Contents, Design, Frame, Site, StateBits};
 use crate::rop::event::{NoProbe, Probe};
 use crate::rop::fast::kernel;
 use crate::rop::fast::lanes::{Count, Lanes, Width};
-use crate::rop::fast::state::{FastTile, PlainPixel};
+use crate::rop::fast::state::{FastTile, PlainPixel, boxed};
 use crate::rop::fast::tally::Tally;
 use crate::rop::over_opaque::Transparent;
 use crate::rop::replay::{Engine, TileState, Told};
@@ -259,7 +259,7 @@ where
         let site = Site { x: 0, y: 0 };
         let sums = self.plain.inner.clear(site).sums;
         let opaque = self.plain.own_passes() > 0;
-        Box::new(FastTile::<F, N>::cleared(frame, states, sums.as_deref(), opaque))
+        Box::new(FastTile::<F, N>::cleared(frame, boxed(states), sums.as_deref(), opaque))
     }
 
     fn draw(&self, pass: u32, state: &mut TileState, fragments: &[Fragment], told: Told<'_>) {

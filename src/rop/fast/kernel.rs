@@ -33,6 +33,7 @@ pub(super) fn draw_samples<S: Simd, F: FastSampler<N>, P: Probe, const N: usize>
     let depth_bits = sampler.depth_bits();
     let mut lengths = [0; MAX_SAMPLES as usize + 1];
     let mut tally = Tally::<P>::new(&mut lengths);
+    let (several, opaque_first) = (!tile.sums.is_empty(), !tile.opaque.is_empty());
     for fragment in fragments {
         let within = TileGrid::within(fragment.x, fragment.y) % TILE_PIXELS;
         if P::LISTENS {
@@ -42,9 +43,13 @@ pub(super) fn draw_samples<S: Simd, F: FastSampler<N>, P: Probe, const N: usize>
             engine.draw_plainly(pass, tile, fragment, probe);
             continue;
         }
-        let Some(SampleMask(coverage)) = engine.cull(pass, tile, fragment, probe) else {
-            continue;
-        };
+        let mut coverage = fragment.coverage.0;
+        if opaque_first {
+            match engine.cull(pass, tile, fragment, probe) {
+                Some(SampleMask(before)) => coverage = before,
+                None => continue,
+            }
+        }
         let z = depths::<S, LanesOf<S, N>>(simd, &loaded, &fragment.depth, depth_bits);
         let held = &mut tile.held[within];
         let stored = LanesOf::<S, N>::load(simd, held.depth.as_ref());
@@ -69,7 +74,7 @@ pub(super) fn draw_samples<S: Simd, F: FastSampler<N>, P: Probe, const N: usize>
             let old = LanesOf::<S, N>::load(simd, row.as_ref());
             LanesOf::<S, N>::select(written, new, old).store(row.as_mut());
         }
-        if P::LISTENS || !tile.sums.is_empty() {
+        if P::LISTENS || several {
             let written = SampleMask(LanesOf::<S, N>::bits(written));
             tally.written += u64::from(written.count());
             if let Some(Some(sums)) = tile.sums.get_mut(within) {

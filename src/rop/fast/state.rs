@@ -27,12 +27,18 @@ pub struct FastTile<F: FastSampler<N>, const N: usize>
 where
     Count<N>: Width,
 {
-    pub(super) held: Vec<Held<Count<N>>>,
-    pub(super) states: Vec<F::State>,
+    pub(super) held: Box<[Held<Count<N>>; TILE_PIXELS]>,
+    pub(super) states: Box<[F::State; TILE_PIXELS]>,
     /// Empty where there is a single pass.
     pub(super) sums: Vec<Option<Box<Sums<N>>>>,
     /// Empty where opaque fragments are drawn like all others.
     pub(super) opaque: Vec<Option<Box<Samples<N>>>>,
+}
+
+/// A list of a tile's pixels, its length known when kernels are compiled.
+pub(super) fn boxed<T>(pixels: Vec<T>) -> Box<[T; TILE_PIXELS]> {
+    let Ok(boxed) = pixels.into_boxed_slice().try_into() else { panic!("a tile's pixels") };
+    boxed
 }
 
 /// A pixel of the plain text.
@@ -56,13 +62,13 @@ where
     /// Pixels in `states`, cleared; with sums or opaque samples where they are asked for.
     pub(super) fn cleared(
         frame: &Frame,
-        states: Vec<F::State>,
+        states: Box<[F::State; TILE_PIXELS]>,
         sums: Option<&Sums<N>>,
         opaque: bool,
     ) -> Self {
         let sums = sums.map(|sums| vec![Some(Box::new(sums.clone())); TILE_PIXELS]);
         FastTile {
-            held: vec![Held::cleared(frame); TILE_PIXELS],
+            held: boxed(vec![Held::cleared(frame); TILE_PIXELS]),
             states,
             sums: sums.unwrap_or_default(),
             opaque: if opaque { vec![None; TILE_PIXELS] } else { Vec::new() },

@@ -1,10 +1,18 @@
 //! The exact answer: every sample's fragments sorted and composited.
 
+mod fast;
+mod lanes;
+mod order;
+
+use fearless_simd::Level;
+
+use crate::design::exact::fast::Fast;
 use crate::error::Result;
 use crate::param::Values;
+use crate::rop::fast::{Count, Width};
 use crate::rop::{
-    Blueprint, Contents, Design, Family, Frame, Info, OpaquePromise, OrderPromise, Probe, Promises,
-    Site, StateBits,
+    Blueprint, Contents, Design, Engine, Family, Frame, Info, OpaquePromise, OrderPromise, Probe,
+    Promises, Site, StateBits,
 };
 use crate::trace::{DepthPlane, Fragment, SampleMask};
 
@@ -25,6 +33,18 @@ impl Blueprint for Exact {
 
     fn at<const N: usize>(_: &Values, frame: &Frame) -> Result<ExactAt<N>> {
         Ok(ExactAt { frame: frame.clone() })
+    }
+
+    fn fast<const N: usize>(
+        values: &Values,
+        frame: &Frame,
+        level: Level,
+    ) -> Result<Option<Box<dyn Engine>>>
+    where
+        Count<N>: Width,
+    {
+        let reference = Box::new(Self::at::<N>(values, frame)?);
+        Ok(Some(Box::new(Fast::new(frame, reference, level))))
     }
 
     fn promises(_: &Values) -> Promises {
@@ -122,3 +142,6 @@ impl<const N: usize> Design for ExactAt<N> {
         Some(2 * size_of::<Layer>())
     }
 }
+
+#[cfg(test)]
+mod tests;
