@@ -26,16 +26,16 @@ pub const MAX_BATCH_ROWS: usize = 1 << 22;
 #[derive(Clone, Debug)]
 pub struct Batch {
     len: usize,
-    x: Column<u16>,
-    y: Column<u16>,
-    coverage: CoverageColumn,
-    z: Column<u32>,
-    dzdx: Column<i32>,
-    dzdy: Column<i32>,
-    colour: [ChannelColumn; 3],
-    alpha: Column<f32>,
-    primitive: Column<u32>,
-    object: Column<u32>,
+    pub(super) x: Column<u16>,
+    pub(super) y: Column<u16>,
+    pub(super) coverage: CoverageColumn,
+    pub(super) z: Column<u32>,
+    pub(super) dzdx: Column<i32>,
+    pub(super) dzdy: Column<i32>,
+    pub(super) colour: [ChannelColumn; 3],
+    pub(super) alpha: Column<f32>,
+    pub(super) primitive: Column<u32>,
+    pub(super) object: Column<u32>,
 }
 
 /// Applies `$f` to the typed column inside a coverage or channel column.

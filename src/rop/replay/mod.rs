@@ -11,6 +11,7 @@
 mod engine;
 mod explain;
 mod group;
+mod unit;
 mod window;
 
 use rayon::prelude::*;
@@ -23,8 +24,8 @@ use crate::picture::{Picture, TilePixels};
 use crate::rop::design::{Frame, StateBits};
 use crate::rop::event::EventCounts;
 use crate::rop::replay::group::{Group, group_tiles};
-use crate::rop::replay::window::Windows;
-use crate::tile::TileMap;
+use crate::rop::replay::window::{Window, Windows};
+use crate::tile::{TileId, TileMap};
 use crate::trace::Trace;
 
 crate::options! {
@@ -97,26 +98,34 @@ pub fn replay(
     let mut events = options.count_events.then(EventCounts::default);
     let total = trace.rows() * u64::from(design.passes()) * groups.len() as u64;
     let mut done = 0;
+    let (mut window, mut ahead) = (Window::default(), Window::default());
     for group in &groups {
-        let mut states: TileMap<TileState> = TileMap::new(grid);
+        let mut states: TileMap<Option<TileState>> = TileMap::new(grid);
         for pass in 0..design.passes() {
             let mut windows = Windows::new(trace, frame, group, options.window.max(1));
-            let mut next = windows.next_binned();
-            while let Some(window) = next.transpose()? {
-                let (drawn, ahead) = rayon::join(
+            let mut more = windows.fill(&mut window)?;
+            while more {
+                let (drawn, filled) = rayon::join(
                     || window.draw(design, frame, pass, &mut states, options.count_events),
-                    || windows.next_binned(),
+                    || windows.fill(&mut ahead),
                 );
                 events = events.map(|events| events.merged(&drawn));
-                next = ahead;
                 done += window.rows as u64;
                 (options.progress)(done, total);
+                more = filled?;
+                std::mem::swap(&mut window, &mut ahead);
             }
             let tiles = states.touched_mut().par_iter_mut();
-            tiles.for_each(|(tile, state)| design.end_pass(pass, grid, *tile, state));
+            tiles.for_each(|(tile, state)| {
+                let state = state.as_mut().expect("it has been drawn to");
+                design.end_pass(pass, grid, *tile, state);
+            });
         }
         let resolved = states.map(|tiles| {
-            let resolve = |(tile, state)| (tile, design.resolve(grid, tile, &state));
+            let resolve = |(tile, state): (TileId, Option<TileState>)| {
+                let state = state.expect("it has been drawn to");
+                (tile, design.resolve(grid, tile, &state))
+            };
             tiles.into_par_iter().map(resolve).collect()
         });
         merge(&mut finished, resolved, group);

@@ -1,6 +1,8 @@
-//! Windows of fragments: read, binned by tile, drawn.
+//! Windows of fragments: read and binned in parallel, drawn tile by tile in parallel.
 
-use arrayvec::ArrayVec;
+use std::ops::Range;
+use std::sync::Mutex;
+
 use rayon::prelude::*;
 
 use crate::error::Result;
@@ -8,8 +10,12 @@ use crate::rop::design::Frame;
 use crate::rop::event::EventCounts;
 use crate::rop::replay::engine::{Engine, TileState, Told};
 use crate::rop::replay::group::Group;
+use crate::rop::replay::unit::{Cursors, Part, UNIT_ROWS, Unit};
 use crate::tile::{TileId, TileMap};
-use crate::trace::{Batch, Fragment, SampleMask, Trace};
+use crate::trace::{Batch, Trace};
+
+/// Fragments of a window, at most: two windows' worth are held, decoded.
+const WINDOW_ROWS: usize = 1 << 18;
 
 /// Cuts a trace into windows of fragments.
 pub(super) struct Windows<'a> {
@@ -17,123 +23,179 @@ pub(super) struct Windows<'a> {
     frame: &'a Frame,
     group: &'a Group,
     length: usize,
-    next_batch: usize,
-    /// What the last window left of its last batch.
-    rest: Option<(Batch, usize)>,
-    /// By tile, for counting: fragments in this window, then the place of the next.
-    cursors: Vec<u32>,
+    /// The next batch, and how many of its rows lie behind.
+    next: (usize, usize),
+    /// The next batch, where it has been read: the last window ended within it.
+    open: Option<Batch>,
+    /// One for each thread that ever sorted at the same time.
+    cursors: Mutex<Vec<Cursors>>,
+    /// A tile's place in the window's `work` plus one; all zero between windows.
+    places: Vec<u32>,
 }
 
 /// A window's fragments, sorted into tiles.
+#[derive(Default)]
 pub(super) struct Window {
-    /// Batches and the row at which each begins in this window.
-    parts: Vec<Part>,
-    /// How many fragments it was made of.
+    /// How many rows it was made of.
     pub rows: usize,
-    /// Tiles with fragments, in rising order, and where theirs end in `rows_by_tile`.
-    tiles: Vec<(TileId, u32)>,
-    /// Window rows, tile after tile, in API order within a tile.
-    rows_by_tile: Vec<u32>,
+    units: Vec<Unit>,
+    /// Tiles with fragments, in the order in which they were met.
+    work: Vec<Work>,
+    runs: Vec<Run>,
 }
 
-struct Part {
-    batch: Batch,
-    /// The batch's first row that belongs to the window.
-    first: usize,
-    /// That row's number in the window.
-    start: usize,
-    /// The number after the part's last row.
-    end: usize,
+/// A tile's fragments: the first and the last of its runs.
+struct Work {
+    tile: TileId,
+    first: u32,
+    last: u32,
+}
+
+/// A tile's fragments in one unit, and the run in the next unit that has some, or itself.
+struct Run {
+    unit: u32,
+    range: Range<u32>,
+    next: u32,
+}
+
+/// Rows of batch `index`, which may have been read.
+struct Piece {
+    index: usize,
+    open: Option<Batch>,
+    rows: Range<usize>,
 }
 
 impl<'a> Windows<'a> {
     pub fn new(trace: &'a Trace, frame: &'a Frame, group: &'a Group, length: usize) -> Self {
-        let cursors = vec![0; frame.grid.count()];
-        // Window rows are numbered in 32 bits.
-        let length = length.min(1 << 30);
-        Windows { trace, frame, group, length, next_batch: 0, rest: None, cursors }
+        Windows {
+            trace,
+            frame,
+            group,
+            length: length.min(window_rows()),
+            next: (0, 0),
+            open: None,
+            cursors: Mutex::default(),
+            places: vec![0; frame.grid.count()],
+        }
     }
 
-    /// The next window, or the error that reading it met; `None` at the end.
-    pub fn next_binned(&mut self) -> Option<Result<Window>> {
-        let mut parts: Vec<Part> = Vec::new();
-        let mut rows = 0;
-        while rows < self.length {
-            let (batch, first) = match self.rest.take() {
-                Some(rest) => rest,
-                None if self.next_batch < self.trace.batch_count() => {
-                    self.next_batch += 1;
-                    match self.trace.batch(self.next_batch - 1) {
-                        Ok(batch) => (batch, 0),
-                        Err(e) => return Some(Err(e)),
-                    }
-                }
-                None => break,
+    /// Fills `window` with the next fragments; `false` at the end.
+    ///
+    /// # Errors
+    /// As [`Trace::batch`].
+    pub fn fill(&mut self, window: &mut Window) -> Result<bool> {
+        let jobs = self.plan();
+        window.rows = 0;
+        window.work.clear();
+        window.runs.clear();
+        let mut units = 0;
+        for job in &jobs {
+            let rows: usize = job.iter().map(|piece| piece.rows.len()).sum();
+            window.rows += rows;
+            units += rows.div_ceil(unit_rows());
+        }
+        if window.units.len() < units {
+            window.units.resize_with(units, Unit::default);
+        }
+        let mut rest = &mut window.units[..units];
+        let mut tasks = Vec::with_capacity(jobs.len());
+        for job in &jobs {
+            let rows: usize = job.iter().map(|piece| piece.rows.len()).sum();
+            let (units, later) = rest.split_at_mut(rows.div_ceil(unit_rows()));
+            tasks.push((job, units));
+            rest = later;
+        }
+        let this = &*self;
+        let run = |(job, units): (&Vec<Piece>, &mut [Unit])| -> Result<Option<Batch>> {
+            let read = |piece: &Piece| match &piece.open {
+                Some(batch) => Ok(batch.clone()),
+                None => this.trace.batch(piece.index),
             };
-            let taken = (batch.len() - first).min(self.length - rows);
-            if first + taken < batch.len() {
-                self.rest = Some((batch.clone(), first + taken));
-            }
-            parts.push(Part { batch, first, start: rows, end: rows + taken });
+            let batches = job.iter().map(read).collect::<Result<Vec<_>>>()?;
+            units.par_iter_mut().enumerate().for_each(|(i, unit)| {
+                let parts = cut(job, &batches, i * unit_rows()..(i + 1) * unit_rows());
+                let taken = this.cursors.lock().expect("no thread panicked").pop();
+                let mut cursors = taken.unwrap_or_else(|| Cursors::new(this.frame));
+                unit.fill(&parts, this.frame, this.group, &mut cursors);
+                this.cursors.lock().expect("no thread panicked").push(cursors);
+            });
+            Ok(batches.into_iter().last())
+        };
+        let results: Vec<Result<Option<Batch>>> = tasks.into_par_iter().map(run).collect();
+        for result in results {
+            self.open = result?;
+        }
+        if self.next.1 == 0 {
+            self.open = None;
+        }
+        self.chain(window, units);
+        Ok(!jobs.is_empty())
+    }
+
+    /// What the next window is made of: large batches one by one, small ones in lots of
+    /// about a unit, each of which one thread reads.
+    fn plan(&mut self) -> Vec<Vec<Piece>> {
+        let mut jobs: Vec<Vec<Piece>> = Vec::new();
+        let (mut rows, mut in_last) = (0, usize::MAX);
+        while rows < self.length && self.next.0 < self.trace.batch_count() {
+            let (index, first) = self.next;
+            let whole = self.trace.batch_rows(index) as usize;
+            let taken = (whole - first).min(self.length - rows);
+            let open = self.open.take();
+            let piece = Piece { index, open, rows: first..first + taken };
+            self.next = if first + taken < whole { (index, first + taken) } else { (index + 1, 0) };
             rows += taken;
+            if in_last.saturating_add(taken) <= unit_rows() {
+                in_last += taken;
+                jobs.last_mut().expect("there is a last one").push(piece);
+            } else {
+                in_last = taken;
+                jobs.push(vec![piece]);
+            }
         }
-        (rows > 0).then(|| Ok(self.bin(parts, rows)))
+        jobs
     }
 
-    /// A counting sort by tile, stable in API order.
-    fn bin(&mut self, parts: Vec<Part>, rows: usize) -> Window {
-        let cursors = &mut self.cursors;
-        let mut tiles: Vec<(TileId, u32)> = Vec::new();
-        for_each_row(&parts, self.frame, self.group, |tile, _| {
-            let count = &mut cursors[tile.0 as usize];
-            if *count == 0 {
-                tiles.push((tile, 0));
+    /// Strings the tiles' runs together, unit after unit.
+    fn chain(&mut self, window: &mut Window, units: usize) {
+        for (i, unit) in window.units[..units].iter().enumerate() {
+            for (tile, range) in unit.tiles() {
+                let run = window.runs.len() as u32;
+                window.runs.push(Run { unit: i as u32, range, next: run });
+                let place = &mut self.places[tile.0 as usize];
+                if *place == 0 {
+                    window.work.push(Work { tile, first: run, last: run });
+                    *place = window.work.len() as u32;
+                } else {
+                    let work = &mut window.work[*place as usize - 1];
+                    window.runs[work.last as usize].next = run;
+                    work.last = run;
+                }
             }
-            *count += 1;
-        });
-        tiles.sort_unstable();
-        let mut end = 0;
-        for (tile, tile_end) in &mut tiles {
-            let cursor = &mut cursors[tile.0 as usize];
-            let count = std::mem::replace(cursor, end);
-            end += count;
-            *tile_end = end;
         }
-        let mut rows_by_tile = vec![0; end as usize];
-        for_each_row(&parts, self.frame, self.group, |tile, row| {
-            let cursor = &mut cursors[tile.0 as usize];
-            rows_by_tile[*cursor as usize] = row;
-            *cursor += 1;
-        });
-        for (tile, _) in &tiles {
-            cursors[tile.0 as usize] = 0;
-        }
-        Window { parts, rows, tiles, rows_by_tile }
-    }
-}
-
-/// Tells tile and window row of every fragment of a window that covers a sample
-/// of the frame and belongs to the group.
-#[inline]
-fn for_each_row(parts: &[Part], frame: &Frame, group: &Group, mut each: impl FnMut(TileId, u32)) {
-    let mask = SampleMask::first(frame.samples());
-    for part in parts {
-        for row in part.start..part.end {
-            let i = row - part.start + part.first;
-            if (part.batch.coverage(i) & mask).is_empty() {
-                continue;
-            }
-            let (x, y) = part.batch.pixel(i);
-            let tile = frame.grid.tile(x, y);
-            if group.holds(tile, x, y) {
-                each(tile, row as u32);
-            }
+        for work in &window.work {
+            self.places[work.tile.0 as usize] = 0;
         }
     }
 }
+fn unit_rows() -> usize { static V: std::sync::OnceLock<usize> = std::sync::OnceLock::new(); *V.get_or_init(|| std::env::var("UNIT").ok().map_or(UNIT_ROWS, |v| v.parse().unwrap())) }
+fn window_rows() -> usize { static V: std::sync::OnceLock<usize> = std::sync::OnceLock::new(); *V.get_or_init(|| std::env::var("WINDOW").ok().map_or(WINDOW_ROWS, |v| v.parse().unwrap())) }
 
-/// Fragments that are decoded at a time: few enough for the nearest cache.
-const CHUNK: usize = 64;
+/// The batches' rows that are rows `range` of all the pieces together.
+fn cut<'a>(pieces: &[Piece], batches: &'a [Batch], range: Range<usize>) -> Vec<Part<'a>> {
+    let mut parts = Vec::with_capacity(pieces.len());
+    let mut start = 0;
+    for (piece, batch) in pieces.iter().zip(batches) {
+        let end = start + piece.rows.len();
+        let (from, to) = (range.start.max(start), range.end.min(end));
+        if from < to {
+            let rows = piece.rows.start + (from - start)..piece.rows.start + (to - start);
+            parts.push(Part { batch, rows });
+        }
+        start = end;
+    }
+    parts
+}
 
 impl Window {
     /// Draws the window's fragments into the tiles' states, tiles in parallel; counts
@@ -143,67 +205,42 @@ impl Window {
         design: &dyn Engine,
         frame: &Frame,
         pass: u32,
-        states: &mut TileMap<TileState>,
+        states: &mut TileMap<Option<TileState>>,
         count: bool,
     ) -> EventCounts {
-        let mut work: Vec<(usize, TileId, &[u32])> = Vec::with_capacity(self.tiles.len());
-        let mut start = 0;
-        for (tile, end) in &self.tiles {
-            let slot = states.touch(*tile, || design.clear(frame.grid, *tile));
-            work.push((slot, *tile, &self.rows_by_tile[start..*end as usize]));
-            start = *end as usize;
+        // Tiles are lent to the threads that draw them; new ones are cleared there.
+        let mut lent = Vec::with_capacity(self.work.len());
+        for work in &self.work {
+            let slot = states.touch(work.tile, || None);
+            lent.push((states.touched_mut()[slot].1.take(), work, slot));
         }
-        work.sort_unstable_by_key(|(slot, ..)| *slot);
-        let mut tiles = Vec::with_capacity(work.len());
-        let (mut rest, mut skipped) = (states.touched_mut(), 0);
-        for (slot, _, rows) in work {
-            let (tile, later) = rest[slot - skipped..].split_first_mut().expect("it is touched");
-            tiles.push((&mut tile.1, rows));
-            (rest, skipped) = (later, slot + 1);
-        }
-        let mask = SampleMask::first(frame.samples());
-        let draw_tile = |(state, rows): (&mut TileState, &[u32])| {
+        let draw_tile = |(state, work, _): &mut (Option<TileState>, &Work, usize)| {
             let mut counts = count.then(EventCounts::default);
-            let mut decoder = Decoder { window: self, part: 0, mask };
-            let mut fragments = ArrayVec::<Fragment, CHUNK>::new();
-            for rows in rows.chunks(CHUNK) {
-                fragments.clear();
-                decoder.decode(rows, &mut fragments);
+            let state = state.get_or_insert_with(|| design.clear(frame.grid, work.tile));
+            let mut next = work.first;
+            loop {
+                let run = &self.runs[next as usize];
                 let told = counts.as_mut().map_or(Told::Nobody, Told::Counts);
-                design.draw(pass, state, &fragments, told);
+                let fragments = self.units[run.unit as usize].fragments(run.range.clone());
+                design.draw(pass, state, fragments, told);
+                if next == work.last {
+                    break counts.unwrap_or_default();
+                }
+                next = run.next;
             }
-            counts.unwrap_or_default()
         };
-        if count {
+        let events = if count {
             let merge = |a: EventCounts, b: EventCounts| a.merged(&b);
-            return tiles.into_par_iter().map(draw_tile).reduce(EventCounts::default, merge);
+            lent.par_iter_mut().map(draw_tile).reduce(EventCounts::default, merge)
+        } else {
+            lent.par_iter_mut().for_each(|tile| {
+                draw_tile(tile);
+            });
+            EventCounts::default()
+        };
+        for (state, _, slot) in lent {
+            states.touched_mut()[slot].1 = state;
         }
-        tiles.into_par_iter().for_each(|tile| {
-            draw_tile(tile);
-        });
-        EventCounts::default()
-    }
-}
-
-/// Reads a window's rows in rising order.
-struct Decoder<'a> {
-    window: &'a Window,
-    /// The part that held the last row.
-    part: usize,
-    mask: SampleMask,
-}
-
-impl Decoder<'_> {
-    fn decode(&mut self, rows: &[u32], fragments: &mut ArrayVec<Fragment, CHUNK>) {
-        for row in rows {
-            let row = *row as usize;
-            while row >= self.window.parts[self.part].end {
-                self.part += 1;
-            }
-            let part = &self.window.parts[self.part];
-            let mut fragment = part.batch.fragment(row - part.start + part.first);
-            fragment.coverage = fragment.coverage & self.mask;
-            fragments.push(fragment);
-        }
+        events
     }
 }
