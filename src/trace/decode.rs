@@ -18,141 +18,152 @@ pub(crate) const BLOCK: usize = 256;
 /// Decodes one batch.
 pub(crate) struct Decoder<'a> {
     batch: &'a Batch,
-    x: Lent<'a, u16>,
-    y: Lent<'a, u16>,
+    block: Box<Block>,
+}
+
+/// Columns side by side: one base address reaches all of them.
+struct Block {
+    x: [u16; BLOCK],
+    y: [u16; BLOCK],
     coverage: [u64; BLOCK],
-    z: Lent<'a, u32>,
-    dzdx: Lent<'a, i32>,
-    dzdy: Lent<'a, i32>,
+    z: [u32; BLOCK],
+    dzdx: [i32; BLOCK],
+    dzdy: [i32; BLOCK],
     colour: [[f32; BLOCK]; 3],
-    alpha: Lent<'a, f32>,
-    primitive: Lent<'a, u32>,
-    object: Lent<'a, u32>,
-}
-
-/// Where a block's fragments lie and what they cover.
-pub(crate) struct Footprints<'a> {
-    pub x: &'a [u16],
-    pub y: &'a [u16],
-    pub coverage: &'a [u64],
-}
-
-/// A column that blocks can borrow: all its values, or one block of a constant.
-enum Lent<'a, T> {
-    Constant([T; BLOCK]),
-    Values(&'a [T]),
-}
-
-impl<'a, T: Native> Lent<'a, T> {
-    fn new(column: &'a Column<T>) -> Self {
-        match column {
-            Column::Constant(v) => Lent::Constant([*v; BLOCK]),
-            Column::Values(v) => Lent::Values(v),
-        }
-    }
-
-    #[inline]
-    fn rows(&self, rows: &Range<usize>) -> &[T] {
-        match self {
-            Lent::Constant(v) => &v[..rows.len()],
-            Lent::Values(v) => &v[rows.clone()],
-        }
-    }
+    alpha: [f32; BLOCK],
+    primitive: [u32; BLOCK],
+    object: [u32; BLOCK],
 }
 
 impl<'a> Decoder<'a> {
     pub fn new(batch: &'a Batch) -> Self {
-        Decoder {
-            batch,
-            x: Lent::new(&batch.x),
-            y: Lent::new(&batch.y),
+        let mut block = Block {
+            x: [0; BLOCK],
+            y: [0; BLOCK],
             coverage: [0; BLOCK],
-            z: Lent::new(&batch.z),
-            dzdx: Lent::new(&batch.dzdx),
-            dzdy: Lent::new(&batch.dzdy),
+            z: [0; BLOCK],
+            dzdx: [0; BLOCK],
+            dzdy: [0; BLOCK],
             colour: [[0.0; BLOCK]; 3],
-            alpha: Lent::new(&batch.alpha),
-            primitive: Lent::new(&batch.primitive),
-            object: Lent::new(&batch.object),
+            alpha: [0.0; BLOCK],
+            primitive: [0; BLOCK],
+            object: [0; BLOCK],
+        };
+        // Constants are written out once.
+        constant(&batch.x, &mut block.x, |v| v);
+        constant(&batch.y, &mut block.y, |v| v);
+        match &batch.coverage {
+            CoverageColumn::U8(c) => constant(c, &mut block.coverage, u64::from),
+            CoverageColumn::U16(c) => constant(c, &mut block.coverage, u64::from),
+            CoverageColumn::U32(c) => constant(c, &mut block.coverage, u64::from),
+            CoverageColumn::U64(c) => constant(c, &mut block.coverage, |v| v),
         }
+        constant(&batch.z, &mut block.z, |v| v);
+        constant(&batch.dzdx, &mut block.dzdx, |v| v);
+        constant(&batch.dzdy, &mut block.dzdy, |v| v);
+        for (values, column) in block.colour.iter_mut().zip(&batch.colour) {
+            match column {
+                ChannelColumn::F16(c) => constant(c, values, widen),
+                ChannelColumn::F32(c) => constant(c, values, |v| v),
+            }
+        }
+        constant(&batch.alpha, &mut block.alpha, |v| v);
+        constant(&batch.primitive, &mut block.primitive, |v| v);
+        constant(&batch.object, &mut block.object, |v| v);
+        Decoder { batch, block: Box::new(block) }
     }
 
-    /// Pixels and coverage of `rows`, at most [`BLOCK`].
-    pub fn footprints(&mut self, rows: Range<usize>) -> Footprints<'_> {
-        self.widen_coverage(&rows);
-        Footprints {
-            x: self.x.rows(&rows),
-            y: self.y.rows(&rows),
-            coverage: &self.coverage[..rows.len()],
-        }
+    /// Columns, rows and coverage of the fragments in `rows`, at most [`BLOCK`]; what
+    /// follows them means nothing.
+    pub fn footprints(&mut self, rows: &Range<usize>) -> Footprints<'_> {
+        self.decode_footprints(rows);
+        let Block { x, y, coverage, .. } = &*self.block;
+        Footprints { x, y, coverage }
     }
 
     /// Tells `each` the fragments of `rows`, at most [`BLOCK`], with their place among them.
     #[inline]
-    pub fn fragments(&mut self, rows: Range<usize>, mut each: impl FnMut(usize, Fragment)) {
-        self.widen_coverage(&rows);
-        for (values, column) in self.colour.iter_mut().zip(&self.batch.colour) {
+    pub fn fragments(&mut self, rows: &Range<usize>, mut each: impl FnMut(usize, Fragment)) {
+        self.decode_footprints(rows);
+        let (batch, block) = (self.batch, &mut *self.block);
+        copy(&batch.z, rows, &mut block.z);
+        copy(&batch.dzdx, rows, &mut block.dzdx);
+        copy(&batch.dzdy, rows, &mut block.dzdy);
+        for (channel, column) in block.colour.iter_mut().zip(&batch.colour) {
             match column {
-                ChannelColumn::F16(Column::Constant(v)) => values.fill(widen(*v)),
-                ChannelColumn::F16(Column::Values(v)) => {
-                    convert(&v[rows.clone()], values, |v| widen(*v));
-                }
-                ChannelColumn::F32(Column::Constant(v)) => values.fill(*v),
-                ChannelColumn::F32(Column::Values(v)) => {
-                    values[..rows.len()].copy_from_slice(&v[rows.clone()]);
-                }
+                ChannelColumn::F16(c) => values(c, rows, channel, widen),
+                ChannelColumn::F32(c) => copy(c, rows, channel),
             }
         }
-        // Slices of one length: the loop below then needs no checks.
-        let n = rows.len();
-        let (x, y) = (&self.x.rows(&rows)[..n], &self.y.rows(&rows)[..n]);
-        let coverage = &self.coverage[..n];
-        let z = &self.z.rows(&rows)[..n];
-        let (dzdx, dzdy) = (&self.dzdx.rows(&rows)[..n], &self.dzdy.rows(&rows)[..n]);
-        let [r, g, b] = self.colour.each_ref().map(|values| &values[..n]);
-        let alpha = &self.alpha.rows(&rows)[..n];
-        let primitive = &self.primitive.rows(&rows)[..n];
-        let object = &self.object.rows(&rows)[..n];
-        for i in 0..n {
+        copy(&batch.alpha, rows, &mut block.alpha);
+        copy(&batch.primitive, rows, &mut block.primitive);
+        copy(&batch.object, rows, &mut block.object);
+        let [r, g, b] = &block.colour;
+        for i in 0..rows.len().min(BLOCK) {
             let fragment = Fragment {
-                x: x[i],
-                y: y[i],
-                coverage: SampleMask(coverage[i]),
-                depth: DepthPlane { z: Unorm32(z[i]), dzdx: dzdx[i], dzdy: dzdy[i] },
+                x: block.x[i],
+                y: block.y[i],
+                coverage: SampleMask(block.coverage[i]),
+                depth: DepthPlane {
+                    z: Unorm32(block.z[i]),
+                    dzdx: block.dzdx[i],
+                    dzdy: block.dzdy[i],
+                },
                 colour: [r[i], g[i], b[i]],
-                alpha: alpha[i],
-                primitive: primitive[i],
-                object: object[i],
+                alpha: block.alpha[i],
+                primitive: block.primitive[i],
+                object: block.object[i],
             };
             each(i, fragment);
         }
     }
 
-    fn widen_coverage(&mut self, rows: &Range<usize>) {
-        fn fill<T: Native + Into<u64>>(
-            column: &Column<T>,
-            rows: &Range<usize>,
-            values: &mut [u64; BLOCK],
-        ) {
-            match column {
-                Column::Constant(v) => values.fill((*v).into()),
-                Column::Values(v) => convert(&v[rows.clone()], values, |v| (*v).into()),
-            }
-        }
-        let values = &mut self.coverage;
-        match &self.batch.coverage {
-            CoverageColumn::U8(c) => fill(c, rows, values),
-            CoverageColumn::U16(c) => fill(c, rows, values),
-            CoverageColumn::U32(c) => fill(c, rows, values),
-            CoverageColumn::U64(c) => fill(c, rows, values),
+    fn decode_footprints(&mut self, rows: &Range<usize>) {
+        let (batch, block) = (self.batch, &mut *self.block);
+        copy(&batch.x, rows, &mut block.x);
+        copy(&batch.y, rows, &mut block.y);
+        match &batch.coverage {
+            CoverageColumn::U8(c) => values(c, rows, &mut block.coverage, u64::from),
+            CoverageColumn::U16(c) => values(c, rows, &mut block.coverage, u64::from),
+            CoverageColumn::U32(c) => values(c, rows, &mut block.coverage, u64::from),
+            CoverageColumn::U64(c) => copy(c, rows, &mut block.coverage),
         }
     }
 }
 
+/// Where a block's fragments lie and what they cover.
+pub(crate) struct Footprints<'a> {
+    pub x: &'a [u16; BLOCK],
+    pub y: &'a [u16; BLOCK],
+    pub coverage: &'a [u64; BLOCK],
+}
+
 #[inline]
-fn convert<T, U>(from: &[T], to: &mut [U; BLOCK], change: impl Fn(&T) -> U) {
-    for (to, from) in to.iter_mut().zip(from) {
-        *to = change(from);
+fn constant<T: Native, U: Copy>(column: &Column<T>, to: &mut [U], change: impl Fn(T) -> U) {
+    if let Column::Constant(value) = column {
+        to.fill(change(*value));
+    }
+}
+
+#[inline]
+fn values<T: Native, U>(
+    column: &Column<T>,
+    rows: &Range<usize>,
+    to: &mut [U; BLOCK],
+    change: impl Fn(T) -> U,
+) {
+    if let Column::Values(values) = column {
+        for (to, value) in to.iter_mut().zip(&values[rows.clone()]) {
+            *to = change(*value);
+        }
+    }
+}
+
+/// As [`values`], through the fastest copy that the machine has.
+#[inline]
+fn copy<T: Native>(column: &Column<T>, rows: &Range<usize>, to: &mut [T; BLOCK]) {
+    if let Column::Values(values) = column {
+        to[..rows.len()].copy_from_slice(&values[rows.clone()]);
     }
 }
 

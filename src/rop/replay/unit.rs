@@ -7,8 +7,9 @@ use crate::rop::replay::group::Group;
 use crate::tile::TileId;
 use crate::trace::{BLOCK, Batch, Decoder, DepthPlane, Footprints, Fragment, SampleMask};
 
-/// Rows of a unit, at most.
-pub(super) const UNIT_ROWS: usize = 1 << 14;
+/// Rows of a unit, at most: so many that a tile's fragments in it are worth a call,
+/// so few that threads end a window at about the same time.
+pub(super) const UNIT_ROWS: usize = 1 << 13;
 
 /// A stretch of the trace, its fragments whole and sorted by tile. It is filled again
 /// and again: memory that has been touched is cheaper than fresh memory.
@@ -18,17 +19,24 @@ pub(super) struct Unit {
     fragments: Vec<Fragment>,
     /// Tiles in the order in which they were met, and where their fragments end.
     tiles: Vec<(TileId, u32)>,
-    /// Each row's tile, between the passes.
-    tile_of_row: Vec<u32>,
 }
 
-/// Fragments by tile while a unit is sorted: their number, then the place of the next.
-/// All zero between units. The last entry is for fragments that are left out.
-pub(super) struct Cursors(Vec<u32>);
+/// What a thread needs to sort a unit.
+pub(super) struct Sorter {
+    /// By tile, zero between units: the number of its fragments, then the place of the
+    /// next. The last entry is for fragments that are left out.
+    cursors: Vec<u32>,
+    /// Tile and length of each run of fragments in one tile. Primitives are drawn row by
+    /// row, so that runs are much fewer than fragments.
+    runs: Vec<(u32, u32)>,
+    /// Each fragment's place in the sorted unit, and room for a run's worth more.
+    places: Vec<u32>,
+}
 
-impl Cursors {
+impl Sorter {
     pub fn new(frame: &Frame) -> Self {
-        Cursors(vec![0; frame.grid.count() + 1])
+        let cursors = vec![0; frame.grid.count() + 1];
+        Sorter { cursors, runs: Vec::new(), places: Vec::new() }
     }
 }
 
@@ -60,65 +68,25 @@ const NOTHING: Fragment = Fragment {
 impl Unit {
     /// Fills it with those fragments of `parts`, at most [`UNIT_ROWS`], that cover a
     /// sample of the frame and belong to the group: a counting sort, stable.
-    pub fn fill(&mut self, parts: &[Part<'_>], frame: &Frame, group: &Group, cursors: &mut Cursors) {
+    pub fn fill(&mut self, parts: &[Part<'_>], frame: &Frame, group: &Group, sorter: &mut Sorter) {
         let mask = SampleMask::first(frame.samples());
-        let cursors = &mut cursors.0;
-        let left_out = cursors.len() - 1;
-        self.tiles.clear();
-        self.tile_of_row.clear();
-
-        let mut tiles = [0; BLOCK];
+        let rows = sorter.count(parts, frame, group, mask, &mut self.tiles);
+        sorter.place(rows, &mut self.tiles);
+        if self.fragments.len() < rows {
+            self.fragments.resize(rows, NOTHING);
+        }
+        let mut places = &sorter.places[..rows];
         for part in parts {
             let mut decoder = Decoder::new(part.batch);
             for rows in part.blocks() {
-                let n = rows.len();
-                find_tiles(decoder.footprints(rows), frame, group, mask, &mut tiles);
-                for tile in &tiles[..n] {
-                    let count = &mut cursors[*tile as usize];
-                    if *count == 0 {
-                        self.tiles.push((TileId(*tile), 0));
-                    }
-                    *count += 1;
-                }
-                self.tile_of_row.extend_from_slice(&tiles[..n]);
-            }
-        }
-
-        // What is left out stands last: written like the rest, so that no branch has to
-        // be foretold, and not looked at.
-        let out = self.tiles.iter().position(|(tile, _)| tile.0 as usize == left_out);
-        let dropped = out.map(|place| self.tiles.remove(place));
-        let mut end = 0;
-        for (tile, tile_end) in &mut self.tiles {
-            let cursor = &mut cursors[tile.0 as usize];
-            end += std::mem::replace(cursor, end);
-            *tile_end = end;
-        }
-        if dropped.is_some() {
-            cursors[left_out] = end;
-        }
-        if self.fragments.len() < self.tile_of_row.len() {
-            self.fragments.resize(self.tile_of_row.len(), NOTHING);
-        }
-
-        let mut tile_of_row = &self.tile_of_row[..];
-        for part in parts {
-            let mut decoder = Decoder::new(part.batch);
-            for rows in part.blocks() {
-                let (tiles, later) = tile_of_row.split_at(rows.len());
-                tile_of_row = later;
-                decoder.fragments(rows, |i, mut fragment| {
+                let (block, later) = places.split_at(rows.len());
+                places = later;
+                decoder.fragments(&rows, |i, mut fragment| {
                     fragment.coverage = fragment.coverage & mask;
-                    let cursor = &mut cursors[tiles[i] as usize];
-                    self.fragments[*cursor as usize] = fragment;
-                    *cursor += 1;
+                    self.fragments[block[i] as usize] = fragment;
                 });
             }
         }
-        for (tile, _) in &self.tiles {
-            cursors[tile.0 as usize] = 0;
-        }
-        cursors[left_out] = 0;
     }
 
     /// Its tiles, and where in [`Unit::fragments`] their fragments stand.
@@ -134,6 +102,97 @@ impl Unit {
     }
 }
 
+impl Sorter {
+    /// Counts the fragments of each tile, which `tiles` then names as they were met, and
+    /// notes the runs; tells how many rows there are.
+    fn count(
+        &mut self,
+        parts: &[Part<'_>],
+        frame: &Frame,
+        group: &Group,
+        mask: SampleMask,
+        tiles: &mut Vec<(TileId, u32)>,
+    ) -> usize {
+        let mut total = 0;
+        tiles.clear();
+        self.runs.clear();
+        let mut tile_of_row = [0; BLOCK];
+        for part in parts {
+            let mut decoder = Decoder::new(part.batch);
+            for rows in part.blocks() {
+                find_tiles(decoder.footprints(&rows), frame, group, mask, &mut tile_of_row);
+                let mut starts = [0_u32; BLOCK + 1];
+                let n = find_runs(&tile_of_row[..rows.len()], &mut starts);
+                for run in starts[..=n].windows(2) {
+                    let (tile, length) = (tile_of_row[run[0] as usize], run[1] - run[0]);
+                    let count = &mut self.cursors[tile as usize];
+                    if *count == 0 {
+                        tiles.push((TileId(tile), 0));
+                    }
+                    *count += length;
+                    self.runs.push((tile, length));
+                }
+                total += rows.len();
+            }
+        }
+        total
+    }
+
+    /// Gives each row its place: tile after tile, and last what is left out, which is
+    /// written like the rest, so that no branch has to be foretold, and not looked at.
+    fn place(&mut self, rows: usize, tiles: &mut Vec<(TileId, u32)>) {
+        let left_out = self.cursors.len() - 1;
+        let met = tiles.iter().position(|(tile, _)| tile.0 as usize == left_out);
+        let last = met.map(|place| tiles.remove(place));
+        let mut end = 0;
+        for (tile, tile_end) in tiles.iter_mut() {
+            let cursor = &mut self.cursors[tile.0 as usize];
+            end += std::mem::replace(cursor, end);
+            *tile_end = end;
+        }
+        if last.is_some() {
+            self.cursors[left_out] = end;
+        }
+        // Places are written a few at a time, beyond the run's end, and then again by
+        // the next run: most runs take one step.
+        const STEP: usize = 16;
+        self.places.resize(self.places.len().max(rows + STEP), 0);
+        let mut start = 0;
+        for (tile, length) in &self.runs {
+            let cursor = &mut self.cursors[*tile as usize];
+            let (first, length) = (*cursor, *length as usize);
+            *cursor += length as u32;
+            for done in (0..length).step_by(STEP) {
+                let places = &mut self.places[start + done..][..STEP];
+                for (i, place) in places.iter_mut().enumerate() {
+                    *place = first + (done + i) as u32;
+                }
+            }
+            start += length;
+        }
+        for (tile, _) in tiles.iter() {
+            self.cursors[tile.0 as usize] = 0;
+        }
+        self.cursors[left_out] = 0;
+    }
+}
+
+/// Where the runs of equal tiles begin, and, after them, where the last one ends; tells how
+/// many there are.
+#[inline]
+fn find_runs(tiles: &[u32], starts: &mut [u32; BLOCK + 1]) -> usize {
+    let mut n = 0;
+    let mut last = u32::MAX;
+    for (i, tile) in tiles.iter().enumerate() {
+        // Written always and kept where a run begins: no branch.
+        starts[n.min(BLOCK)] = i as u32;
+        n += usize::from(*tile != last);
+        last = *tile;
+    }
+    starts[n.min(BLOCK)] = tiles.len() as u32;
+    n.min(BLOCK)
+}
+
 /// The tile of each fragment; one past the frame's tiles for those that are left out.
 #[inline]
 fn find_tiles(
@@ -147,8 +206,9 @@ fn find_tiles(
     let Footprints { x, y, coverage } = footprints;
     let pixels = x.iter().zip(y);
     for ((tile, (x, y)), coverage) in tiles.iter_mut().zip(pixels.clone()).zip(coverage) {
-        let held = coverage & mask.0 != 0;
-        *tile = if held { frame.grid.tile(*x, *y).0 } else { left_out };
+        // Chosen by a mask: a branch would be mispredicted wherever coverage is mixed.
+        let held = u32::from(coverage & mask.0 != 0).wrapping_neg();
+        *tile = frame.grid.tile(*x, *y).0 & held | left_out & !held;
     }
     if *group != Group::Everything {
         for (tile, (x, y)) in tiles.iter_mut().zip(pixels) {

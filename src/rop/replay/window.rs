@@ -10,12 +10,16 @@ use crate::rop::design::Frame;
 use crate::rop::event::EventCounts;
 use crate::rop::replay::engine::{Engine, TileState, Told};
 use crate::rop::replay::group::Group;
-use crate::rop::replay::unit::{Cursors, Part, UNIT_ROWS, Unit};
+use crate::rop::replay::unit::{Part, Sorter, UNIT_ROWS, Unit};
 use crate::tile::{TileId, TileMap};
 use crate::trace::{Batch, Trace};
 
-/// Fragments of a window, at most: two windows' worth are held, decoded.
-const WINDOW_ROWS: usize = 1 << 18;
+/// Fragments of a window for each thread: two windows' worth are held, decoded, and
+/// what stays in the nearer caches between sorting and drawing is worth more than
+/// visiting a tile less often.
+const ROWS_PER_THREAD: usize = 1 << 15;
+/// Fragments of a window, at most, however many threads there are: bounds the memory.
+const WINDOW_ROWS: usize = 1 << 19;
 
 /// Cuts a trace into windows of fragments.
 pub(super) struct Windows<'a> {
@@ -28,7 +32,7 @@ pub(super) struct Windows<'a> {
     /// The next batch, where it has been read: the last window ended within it.
     open: Option<Batch>,
     /// One for each thread that ever sorted at the same time.
-    cursors: Mutex<Vec<Cursors>>,
+    sorters: Mutex<Vec<Sorter>>,
     /// A tile's place in the window's `work` plus one; all zero between windows.
     places: Vec<u32>,
 }
@@ -71,10 +75,10 @@ impl<'a> Windows<'a> {
             trace,
             frame,
             group,
-            length: length.min(window_rows()),
+            length: length.min(WINDOW_ROWS.min(ROWS_PER_THREAD * rayon::current_num_threads())),
             next: (0, 0),
             open: None,
-            cursors: Mutex::default(),
+            sorters: Mutex::default(),
             places: vec![0; frame.grid.count()],
         }
     }
@@ -92,7 +96,7 @@ impl<'a> Windows<'a> {
         for job in &jobs {
             let rows: usize = job.iter().map(|piece| piece.rows.len()).sum();
             window.rows += rows;
-            units += rows.div_ceil(unit_rows());
+            units += rows.div_ceil(UNIT_ROWS);
         }
         if window.units.len() < units {
             window.units.resize_with(units, Unit::default);
@@ -101,7 +105,7 @@ impl<'a> Windows<'a> {
         let mut tasks = Vec::with_capacity(jobs.len());
         for job in &jobs {
             let rows: usize = job.iter().map(|piece| piece.rows.len()).sum();
-            let (units, later) = rest.split_at_mut(rows.div_ceil(unit_rows()));
+            let (units, later) = rest.split_at_mut(rows.div_ceil(UNIT_ROWS));
             tasks.push((job, units));
             rest = later;
         }
@@ -113,11 +117,11 @@ impl<'a> Windows<'a> {
             };
             let batches = job.iter().map(read).collect::<Result<Vec<_>>>()?;
             units.par_iter_mut().enumerate().for_each(|(i, unit)| {
-                let parts = cut(job, &batches, i * unit_rows()..(i + 1) * unit_rows());
-                let taken = this.cursors.lock().expect("no thread panicked").pop();
-                let mut cursors = taken.unwrap_or_else(|| Cursors::new(this.frame));
-                unit.fill(&parts, this.frame, this.group, &mut cursors);
-                this.cursors.lock().expect("no thread panicked").push(cursors);
+                let parts = cut(job, &batches, i * UNIT_ROWS..(i + 1) * UNIT_ROWS);
+                let taken = this.sorters.lock().expect("no thread panicked").pop();
+                let mut sorter = taken.unwrap_or_else(|| Sorter::new(this.frame));
+                unit.fill(&parts, this.frame, this.group, &mut sorter);
+                this.sorters.lock().expect("no thread panicked").push(sorter);
             });
             Ok(batches.into_iter().last())
         };
@@ -145,7 +149,7 @@ impl<'a> Windows<'a> {
             let piece = Piece { index, open, rows: first..first + taken };
             self.next = if first + taken < whole { (index, first + taken) } else { (index + 1, 0) };
             rows += taken;
-            if in_last.saturating_add(taken) <= unit_rows() {
+            if in_last.saturating_add(taken) <= UNIT_ROWS {
                 in_last += taken;
                 jobs.last_mut().expect("there is a last one").push(piece);
             } else {
@@ -178,8 +182,6 @@ impl<'a> Windows<'a> {
         }
     }
 }
-fn unit_rows() -> usize { static V: std::sync::OnceLock<usize> = std::sync::OnceLock::new(); *V.get_or_init(|| std::env::var("UNIT").ok().map_or(UNIT_ROWS, |v| v.parse().unwrap())) }
-fn window_rows() -> usize { static V: std::sync::OnceLock<usize> = std::sync::OnceLock::new(); *V.get_or_init(|| std::env::var("WINDOW").ok().map_or(WINDOW_ROWS, |v| v.parse().unwrap())) }
 
 /// The batches' rows that are rows `range` of all the pieces together.
 fn cut<'a>(pieces: &[Piece], batches: &'a [Batch], range: Range<usize>) -> Vec<Part<'a>> {
