@@ -102,7 +102,7 @@ pub fn replay(
     for group in &groups {
         let mut states: TileMap<Option<TileState>> = TileMap::new(grid);
         for pass in 0..design.passes() {
-            let mut windows = Windows::new(trace, frame, group, options.window.max(1));
+            let mut windows = Windows::new(trace, frame, group, options.window)?;
             let mut more = windows.fill(&mut window)?;
             while more {
                 let (drawn, filled) = rayon::join(

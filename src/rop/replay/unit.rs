@@ -41,13 +41,12 @@ impl Sorter {
 }
 
 /// Rows of a batch.
-#[derive(Clone)]
-pub(super) struct Part<'a> {
-    pub batch: &'a Batch,
+pub(super) struct Part {
+    pub batch: Batch,
     pub rows: Range<usize>,
 }
 
-impl Part<'_> {
+impl Part {
     fn blocks(&self) -> impl Iterator<Item = Range<usize>> {
         let end = self.rows.end;
         self.rows.clone().step_by(BLOCK).map(move |start| start..end.min(start + BLOCK))
@@ -68,7 +67,7 @@ const NOTHING: Fragment = Fragment {
 impl Unit {
     /// Fills it with those fragments of `parts`, at most [`UNIT_ROWS`], that cover a
     /// sample of the frame and belong to the group: a counting sort, stable.
-    pub fn fill(&mut self, parts: &[Part<'_>], frame: &Frame, group: &Group, sorter: &mut Sorter) {
+    pub fn fill(&mut self, parts: &[Part], frame: &Frame, group: &Group, sorter: &mut Sorter) {
         let mask = SampleMask::first(frame.samples());
         let rows = sorter.count(parts, frame, group, mask, &mut self.tiles);
         sorter.place(rows, &mut self.tiles);
@@ -77,7 +76,7 @@ impl Unit {
         }
         let mut places = &sorter.places[..rows];
         for part in parts {
-            let mut decoder = Decoder::new(part.batch);
+            let mut decoder = Decoder::new(&part.batch);
             for rows in part.blocks() {
                 let (block, later) = places.split_at(rows.len());
                 places = later;
@@ -107,7 +106,7 @@ impl Sorter {
     /// notes the runs; tells how many rows there are.
     fn count(
         &mut self,
-        parts: &[Part<'_>],
+        parts: &[Part],
         frame: &Frame,
         group: &Group,
         mask: SampleMask,
@@ -118,7 +117,7 @@ impl Sorter {
         self.runs.clear();
         let mut tile_of_row = [0; BLOCK];
         for part in parts {
-            let mut decoder = Decoder::new(part.batch);
+            let mut decoder = Decoder::new(&part.batch);
             for rows in part.blocks() {
                 find_tiles(decoder.footprints(&rows), frame, group, mask, &mut tile_of_row);
                 let mut starts = [0_u32; BLOCK + 1];

@@ -1,4 +1,6 @@
-//! Windows of fragments: read and binned in parallel, drawn tile by tile in parallel.
+//! Windows of fragments, in three stages that run at the same time: one window is drawn
+//! while the next is sorted and the batches of the one after that are read. Each stage
+//! is parallel in itself.
 
 use std::ops::Range;
 use std::sync::Mutex;
@@ -27,14 +29,25 @@ pub(super) struct Windows<'a> {
     frame: &'a Frame,
     group: &'a Group,
     length: usize,
-    /// The next batch, and how many of its rows lie behind.
+    /// The next batch to read, and how many of its rows lie behind.
     next: (usize, usize),
-    /// The next batch, where it has been read: the last window ended within it.
-    open: Option<Batch>,
+    /// What has been read of the next window.
+    ready: Vec<Lot>,
     /// One for each thread that ever sorted at the same time.
     sorters: Mutex<Vec<Sorter>>,
     /// A tile's place in the window's `work` plus one; all zero between windows.
     places: Vec<u32>,
+}
+
+/// Parts of batches that one thread reads: of one large batch, or of small ones that make
+/// a unit together.
+type Lot = Vec<Part>;
+
+/// Rows of batch `index`, to be read unless it is `open`.
+struct Piece {
+    index: usize,
+    rows: Range<usize>,
+    open: Option<Batch>,
 }
 
 /// A window's fragments, sorted into tiles.
@@ -62,106 +75,109 @@ struct Run {
     next: u32,
 }
 
-/// Rows of batch `index`, which may have been read.
-struct Piece {
-    index: usize,
-    open: Option<Batch>,
-    rows: Range<usize>,
-}
-
 impl<'a> Windows<'a> {
-    pub fn new(trace: &'a Trace, frame: &'a Frame, group: &'a Group, length: usize) -> Self {
-        Windows {
+    /// Windows of at most `length` fragments of `group`.
+    ///
+    /// # Errors
+    /// As [`Trace::batch`].
+    pub fn new(
+        trace: &'a Trace,
+        frame: &'a Frame,
+        group: &'a Group,
+        length: usize,
+    ) -> Result<Self> {
+        let most = WINDOW_ROWS.min(ROWS_PER_THREAD * rayon::current_num_threads());
+        let mut windows = Windows {
             trace,
             frame,
             group,
-            length: length.min(WINDOW_ROWS.min(ROWS_PER_THREAD * rayon::current_num_threads())),
+            length: length.clamp(1, most),
             next: (0, 0),
-            open: None,
+            ready: Vec::new(),
             sorters: Mutex::default(),
             places: vec![0; frame.grid.count()],
-        }
+        };
+        let plan = windows.plan(None);
+        windows.ready = windows.read(plan)?;
+        Ok(windows)
     }
 
-    /// Fills `window` with the next fragments; `false` at the end.
+    /// Fills `window` with the next fragments, reading ahead; `false` at the end.
     ///
     /// # Errors
     /// As [`Trace::batch`].
     pub fn fill(&mut self, window: &mut Window) -> Result<bool> {
-        let jobs = self.plan();
-        window.rows = 0;
-        window.work.clear();
-        window.runs.clear();
-        let mut units = 0;
-        for job in &jobs {
-            let rows: usize = job.iter().map(|piece| piece.rows.len()).sum();
-            window.rows += rows;
-            units += rows.div_ceil(UNIT_ROWS);
-        }
-        if window.units.len() < units {
-            window.units.resize_with(units, Unit::default);
-        }
-        let mut rest = &mut window.units[..units];
-        let mut tasks = Vec::with_capacity(jobs.len());
-        for job in &jobs {
-            let rows: usize = job.iter().map(|piece| piece.rows.len()).sum();
-            let (units, later) = rest.split_at_mut(rows.div_ceil(UNIT_ROWS));
-            tasks.push((job, units));
-            rest = later;
-        }
+        let lots = std::mem::take(&mut self.ready);
+        let plan = self.plan(lots.last().and_then(|lot| lot.last()));
         let this = &*self;
-        let run = |(job, units): (&Vec<Piece>, &mut [Unit])| -> Result<Option<Batch>> {
-            let read = |piece: &Piece| match &piece.open {
-                Some(batch) => Ok(batch.clone()),
-                None => this.trace.batch(piece.index),
-            };
-            let batches = job.iter().map(read).collect::<Result<Vec<_>>>()?;
-            units.par_iter_mut().enumerate().for_each(|(i, unit)| {
-                let parts = cut(job, &batches, i * UNIT_ROWS..(i + 1) * UNIT_ROWS);
-                let taken = this.sorters.lock().expect("no thread panicked").pop();
-                let mut sorter = taken.unwrap_or_else(|| Sorter::new(this.frame));
-                unit.fill(&parts, this.frame, this.group, &mut sorter);
-                this.sorters.lock().expect("no thread panicked").push(sorter);
-            });
-            Ok(batches.into_iter().last())
-        };
-        let results: Vec<Result<Option<Batch>>> = tasks.into_par_iter().map(run).collect();
-        for result in results {
-            self.open = result?;
-        }
-        if self.next.1 == 0 {
-            self.open = None;
-        }
+        let (units, ready) = rayon::join(|| this.sort(&lots, window), || this.read(plan));
+        self.ready = ready?;
         self.chain(window, units);
-        Ok(!jobs.is_empty())
+        Ok(!lots.is_empty())
     }
 
-    /// What the next window is made of: large batches one by one, small ones in lots of
-    /// about a unit, each of which one thread reads.
-    fn plan(&mut self) -> Vec<Vec<Piece>> {
-        let mut jobs: Vec<Vec<Piece>> = Vec::new();
-        let (mut rows, mut in_last) = (0, usize::MAX);
+    /// What the next window is made of; `last` is what was read last.
+    fn plan(&mut self, last: Option<&Part>) -> Vec<Vec<Piece>> {
+        let mut open = last.filter(|_| self.next.1 > 0).map(|part| part.batch.clone());
+        let mut lots: Vec<Vec<Piece>> = Vec::new();
+        let (mut rows, mut in_lot) = (0, usize::MAX);
         while rows < self.length && self.next.0 < self.trace.batch_count() {
             let (index, first) = self.next;
             let whole = self.trace.batch_rows(index) as usize;
             let taken = (whole - first).min(self.length - rows);
-            let open = self.open.take();
-            let piece = Piece { index, open, rows: first..first + taken };
             self.next = if first + taken < whole { (index, first + taken) } else { (index + 1, 0) };
             rows += taken;
-            if in_last.saturating_add(taken) <= UNIT_ROWS {
-                in_last += taken;
-                jobs.last_mut().expect("there is a last one").push(piece);
-            } else {
-                in_last = taken;
-                jobs.push(vec![piece]);
+            let piece = Piece { index, rows: first..first + taken, open: open.take() };
+            match lots.last_mut().filter(|_| in_lot + taken <= UNIT_ROWS) {
+                Some(lot) => {
+                    in_lot += taken;
+                    lot.push(piece);
+                }
+                None => {
+                    in_lot = taken;
+                    lots.push(vec![piece]);
+                }
             }
         }
-        jobs
+        lots
+    }
+
+    fn read(&self, plan: Vec<Vec<Piece>>) -> Result<Vec<Lot>> {
+        let read = |piece: Piece| {
+            let batch = piece.open.map_or_else(|| self.trace.batch(piece.index), Ok)?;
+            Ok(Part { batch, rows: piece.rows })
+        };
+        let lots = plan.into_par_iter().map(|lot| lot.into_iter().map(read).collect());
+        // The first error in the trace's order, whichever was met first.
+        lots.collect::<Vec<Result<Lot>>>().into_iter().collect()
+    }
+
+    /// Sorts `lots` into the window's units; tells how many it takes.
+    fn sort(&self, lots: &[Lot], window: &mut Window) -> usize {
+        let rows_of = |lot: &Lot| lot.iter().map(|part| part.rows.len()).sum::<usize>();
+        window.rows = lots.iter().map(rows_of).sum();
+        let units = lots.iter().map(|lot| rows_of(lot).div_ceil(UNIT_ROWS)).sum();
+        if window.units.len() < units {
+            window.units.resize_with(units, Unit::default);
+        }
+        let starts = lots
+            .iter()
+            .flat_map(|lot| (0..rows_of(lot)).step_by(UNIT_ROWS).map(move |start| (lot, start)));
+        let work: Vec<_> = window.units.iter_mut().zip(starts).collect();
+        work.into_par_iter().for_each(|(unit, (lot, start))| {
+            let parts = cut(lot, start..start + UNIT_ROWS);
+            let idle = self.sorters.lock().expect("no thread panicked").pop();
+            let mut sorter = idle.unwrap_or_else(|| Sorter::new(self.frame));
+            unit.fill(&parts, self.frame, self.group, &mut sorter);
+            self.sorters.lock().expect("no thread panicked").push(sorter);
+        });
+        units
     }
 
     /// Strings the tiles' runs together, unit after unit.
     fn chain(&mut self, window: &mut Window, units: usize) {
+        window.work.clear();
+        window.runs.clear();
         for (i, unit) in window.units[..units].iter().enumerate() {
             for (tile, range) in unit.tiles() {
                 let run = window.runs.len() as u32;
@@ -183,16 +199,16 @@ impl<'a> Windows<'a> {
     }
 }
 
-/// The batches' rows that are rows `range` of all the pieces together.
-fn cut<'a>(pieces: &[Piece], batches: &'a [Batch], range: Range<usize>) -> Vec<Part<'a>> {
-    let mut parts = Vec::with_capacity(pieces.len());
+/// Those rows of a lot that are rows `range` of all its parts together.
+fn cut(lot: &[Part], range: Range<usize>) -> Vec<Part> {
+    let mut parts = Vec::with_capacity(lot.len());
     let mut start = 0;
-    for (piece, batch) in pieces.iter().zip(batches) {
-        let end = start + piece.rows.len();
+    for Part { batch, rows } in lot {
+        let end = start + rows.len();
         let (from, to) = (range.start.max(start), range.end.min(end));
         if from < to {
-            let rows = piece.rows.start + (from - start)..piece.rows.start + (to - start);
-            parts.push(Part { batch, rows });
+            let rows = rows.start + (from - start)..rows.start + (to - start);
+            parts.push(Part { batch: batch.clone(), rows });
         }
         start = end;
     }
