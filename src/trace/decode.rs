@@ -13,7 +13,7 @@ use crate::trace::column::{ChannelColumn, Column, CoverageColumn, Native};
 use crate::trace::fragment::{DepthPlane, Fragment, SampleMask, Unorm32};
 
 /// Fragments that are decoded at a time: few enough for the nearest cache.
-pub(crate) const BLOCK: usize = 256;
+pub(crate) const BLOCK: usize = 128;
 
 /// Decodes one batch.
 pub(crate) struct Decoder<'a> {

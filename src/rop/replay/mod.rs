@@ -1,12 +1,14 @@
 //! Replaying a trace through a design: streamed, binned by tile, tiles in
 //! parallel.
 //!
-//! A window of fragments is read and sorted into tiles while the window before
-//! it is drawn. Within a tile, fragments stay in API order and one thread draws
-//! them, so that neither the number of threads nor the size of the windows
-//! changes a bit of the result. Memory is that of the touched tiles' state and of
-//! two windows. A design whose state grows with the fragments is given the trace
-//! several times, for groups of tiles that fit into the memory limit.
+//! While a window of fragments is drawn, the next is sorted into tiles and the one
+//! after that is read; each of the three is parallel in itself. Within a tile,
+//! fragments stay in API order and one thread draws them, so that neither the number
+//! of threads nor the size of the windows changes a bit of the result. Memory is that
+//! of the touched tiles' state and of a few windows, which are small: what is sorted
+//! should still lie in a cache when it is drawn. A design whose state grows with the
+//! fragments is given the trace several times, for groups of tiles that fit into the
+//! memory limit.
 
 mod engine;
 mod explain;
@@ -43,7 +45,7 @@ pub struct ReplayOptions<'a> {
     pub engine: Which,
     /// Whether to count events.
     pub count_events: bool,
-    /// Fragments that are binned at a time, at least 1.
+    /// Fragments that are binned at a time, at most.
     pub window: usize,
     /// Bytes that the state of a design may take that grows with the fragments.
     pub memory: u64,

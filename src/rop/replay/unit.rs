@@ -5,7 +5,7 @@ use std::ops::Range;
 use crate::rop::design::Frame;
 use crate::rop::replay::group::Group;
 use crate::tile::TileId;
-use crate::trace::{BLOCK, Batch, Decoder, DepthPlane, Footprints, Fragment, SampleMask};
+use crate::trace::{BLOCK, Batch, Decoder, DepthPlane, Footprints, Fragment, SampleMask, Unorm32};
 
 /// Rows of a unit, at most: so many that a tile's fragments in it are worth a call,
 /// so few that threads end a window at about the same time.
@@ -53,11 +53,12 @@ impl Part {
     }
 }
 
+/// What stands in a unit's memory before it is first filled.
 const NOTHING: Fragment = Fragment {
     x: 0,
     y: 0,
     coverage: SampleMask::NONE,
-    depth: DepthPlane { z: crate::trace::Unorm32::NEAR, dzdx: 0, dzdy: 0 },
+    depth: DepthPlane { z: Unorm32::NEAR, dzdx: 0, dzdy: 0 },
     colour: [0.0; 3],
     alpha: 0.0,
     primitive: 0,
@@ -214,6 +215,52 @@ fn find_tiles(
             if !group.holds(TileId(*tile), *x, *y) {
                 *tile = left_out;
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_begin_where_the_tile_changes() {
+        let mut starts = [0; BLOCK + 1];
+        let n = find_runs(&[4, 4, 4, 7, 4, 4, 9], &mut starts);
+        assert_eq!((n, &starts[..=n]), (4, &[0, 3, 4, 6, 7][..]));
+        assert_eq!(find_runs(&[], &mut starts), 0);
+        let changing: Vec<u32> = (0..BLOCK as u32).collect();
+        let n = find_runs(&changing, &mut starts);
+        assert_eq!((n, starts[n]), (BLOCK, BLOCK as u32));
+    }
+
+    /// Tiles as they were met, what is left out behind them, rows of a tile in order;
+    /// with a run longer than a step.
+    #[test]
+    fn places_are_a_stable_sort() {
+        let left_out = 9;
+        let tile_of_row: Vec<u32> =
+            [vec![5; 3], vec![left_out; 2], vec![2; 40], vec![5; 1], vec![left_out], vec![2; 7]]
+                .concat();
+        let mut sorter =
+            Sorter { cursors: vec![0; left_out as usize + 1], runs: vec![], places: vec![] };
+        let mut tiles = Vec::new();
+        for (first, tile) in tile_of_row.iter().enumerate() {
+            if !tile_of_row[..first].contains(tile) {
+                tiles.push((TileId(*tile), 0));
+            }
+            sorter.cursors[*tile as usize] += 1;
+        }
+        let run = |run: &[u32]| (run[0], run.len() as u32);
+        sorter.runs = tile_of_row.chunk_by(|a, b| a == b).map(run).collect();
+        sorter.place(tile_of_row.len(), &mut tiles);
+        assert_eq!(tiles, [(TileId(5), 4), (TileId(2), 51)]);
+        assert!(sorter.cursors.iter().all(|cursor| *cursor == 0));
+        let rank = |tile: u32| [5, 2, left_out].iter().position(|t| *t == tile);
+        let mut expected: Vec<usize> = (0..tile_of_row.len()).collect();
+        expected.sort_by_key(|row| rank(tile_of_row[*row]));
+        for (place, row) in expected.into_iter().enumerate() {
+            assert_eq!(sorter.places[row] as usize, place);
         }
     }
 }
