@@ -13,6 +13,7 @@ mod batch;
 mod column;
 mod content;
 mod decode;
+mod decompress;
 mod fragment;
 mod header;
 mod layout;

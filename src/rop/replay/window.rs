@@ -2,6 +2,7 @@
 //! while the next is sorted and the batches of the one after that are read. Each stage
 //! is parallel in itself.
 
+use std::collections::VecDeque;
 use std::ops::Range;
 use std::sync::Mutex;
 
@@ -14,7 +15,7 @@ use crate::rop::replay::engine::{Engine, TileState, Told};
 use crate::rop::replay::group::Group;
 use crate::rop::replay::unit::{Part, Sorter, UNIT_ROWS, Unit};
 use crate::tile::{TileId, TileMap};
-use crate::trace::{Batch, Trace};
+use crate::trace::Trace;
 
 /// Fragments of a window for each thread: two windows' worth are held, decoded, and
 /// what stays in the nearer caches between sorting and drawing is worth more than
@@ -23,31 +24,26 @@ const ROWS_PER_THREAD: usize = 1 << 15;
 /// Fragments of a window, at most, however many threads there are: bounds the memory.
 const WINDOW_ROWS: usize = 1 << 19;
 
+/// Fragments that are read ahead for each thread: a batch of the usual size, so that all
+/// threads can read at once.
+const AHEAD_PER_THREAD: usize = 1 << 16;
+
 /// Cuts a trace into windows of fragments.
 pub(super) struct Windows<'a> {
     trace: &'a Trace,
     frame: &'a Frame,
     group: &'a Group,
     length: usize,
-    /// The next batch to read, and how many of its rows lie behind.
-    next: (usize, usize),
-    /// What has been read of the next window.
-    ready: Vec<Lot>,
+    ahead: usize,
+    /// The next batch to read.
+    next: usize,
+    /// What has been read and not sorted, and how many rows that is.
+    queue: VecDeque<Part>,
+    queued: usize,
     /// One for each thread that ever sorted at the same time.
     sorters: Mutex<Vec<Sorter>>,
     /// A tile's place in the window's `work` plus one; all zero between windows.
     places: Vec<u32>,
-}
-
-/// Parts of batches that one thread reads: of one large batch, or of small ones that make
-/// a unit together.
-type Lot = Vec<Part>;
-
-/// Rows of batch `index`, to be read unless it is `open`.
-struct Piece {
-    index: usize,
-    rows: Range<usize>,
-    open: Option<Batch>,
 }
 
 /// A window's fragments, sorted into tiles.
@@ -86,19 +82,22 @@ impl<'a> Windows<'a> {
         group: &'a Group,
         length: usize,
     ) -> Result<Self> {
-        let most = WINDOW_ROWS.min(ROWS_PER_THREAD * rayon::current_num_threads());
+        let threads = rayon::current_num_threads();
+        let length = length.clamp(1, WINDOW_ROWS.min(ROWS_PER_THREAD * threads));
         let mut windows = Windows {
             trace,
             frame,
             group,
-            length: length.clamp(1, most),
-            next: (0, 0),
-            ready: Vec::new(),
+            length,
+            ahead: length.max(WINDOW_ROWS.min(AHEAD_PER_THREAD * threads)),
+            next: 0,
+            queue: VecDeque::new(),
+            queued: 0,
             sorters: Mutex::default(),
             places: vec![0; frame.grid.count()],
         };
-        let plan = windows.plan(None);
-        windows.ready = windows.read(plan)?;
+        let batches = windows.plan();
+        windows.queue = windows.read(batches)?.into();
         Ok(windows)
     }
 
@@ -107,65 +106,60 @@ impl<'a> Windows<'a> {
     /// # Errors
     /// As [`Trace::batch`].
     pub fn fill(&mut self, window: &mut Window) -> Result<bool> {
-        let lots = std::mem::take(&mut self.ready);
-        let plan = self.plan(lots.last().and_then(|lot| lot.last()));
+        let parts = self.take();
+        let batches = self.plan();
         let this = &*self;
-        let (units, ready) = rayon::join(|| this.sort(&lots, window), || this.read(plan));
-        self.ready = ready?;
+        let (units, read) = rayon::join(|| this.sort(&parts, window), || this.read(batches));
+        self.queue.extend(read?);
         self.chain(window, units);
-        Ok(!lots.is_empty())
+        Ok(!parts.is_empty())
     }
 
-    /// What the next window is made of; `last` is what was read last.
-    fn plan(&mut self, last: Option<&Part>) -> Vec<Vec<Piece>> {
-        let mut open = last.filter(|_| self.next.1 > 0).map(|part| part.batch.clone());
-        let mut lots: Vec<Vec<Piece>> = Vec::new();
-        let (mut rows, mut in_lot) = (0, usize::MAX);
-        while rows < self.length && self.next.0 < self.trace.batch_count() {
-            let (index, first) = self.next;
-            let whole = self.trace.batch_rows(index) as usize;
-            let taken = (whole - first).min(self.length - rows);
-            self.next = if first + taken < whole { (index, first + taken) } else { (index + 1, 0) };
-            rows += taken;
-            let piece = Piece { index, rows: first..first + taken, open: open.take() };
-            match lots.last_mut().filter(|_| in_lot + taken <= UNIT_ROWS) {
-                Some(lot) => {
-                    in_lot += taken;
-                    lot.push(piece);
-                }
-                None => {
-                    in_lot = taken;
-                    lots.push(vec![piece]);
-                }
+    /// A window's worth of what has been read.
+    fn take(&mut self) -> Vec<Part> {
+        let (mut parts, mut rows) = (Vec::new(), 0);
+        while rows < self.length
+            && let Some(Part { batch, rows: left }) = self.queue.pop_front()
+        {
+            let cut = left.end.min(left.start + self.length - rows);
+            if cut < left.end {
+                self.queue.push_front(Part { batch: batch.clone(), rows: cut..left.end });
+            }
+            if left.start < cut {
+                rows += cut - left.start;
+                parts.push(Part { batch, rows: left.start..cut });
             }
         }
-        lots
+        self.queued -= rows;
+        parts
     }
 
-    fn read(&self, plan: Vec<Vec<Piece>>) -> Result<Vec<Lot>> {
-        let read = |piece: Piece| {
-            let batch = piece.open.map_or_else(|| self.trace.batch(piece.index), Ok)?;
-            Ok(Part { batch, rows: piece.rows })
-        };
-        let lots = plan.into_par_iter().map(|lot| lot.into_iter().map(read).collect());
+    /// The batches to read now: none where what has been read makes a window.
+    fn plan(&mut self) -> Range<usize> {
+        let first = self.next;
+        let wanted = if self.queued < self.length { self.ahead } else { 0 };
+        while self.queued < wanted && self.next < self.trace.batch_count() {
+            self.queued += self.trace.batch_rows(self.next) as usize;
+            self.next += 1;
+        }
+        first..self.next
+    }
+
+    fn read(&self, batches: Range<usize>) -> Result<Vec<Part>> {
+        let read = |i| self.trace.batch(i).map(|batch| Part { rows: 0..batch.len(), batch });
         // The first error in the trace's order, whichever was met first.
-        lots.collect::<Vec<Result<Lot>>>().into_iter().collect()
+        batches.into_par_iter().map(read).collect::<Vec<_>>().into_iter().collect()
     }
 
-    /// Sorts `lots` into the window's units; tells how many it takes.
-    fn sort(&self, lots: &[Lot], window: &mut Window) -> usize {
-        let rows_of = |lot: &Lot| lot.iter().map(|part| part.rows.len()).sum::<usize>();
-        window.rows = lots.iter().map(rows_of).sum();
-        let units = lots.iter().map(|lot| rows_of(lot).div_ceil(UNIT_ROWS)).sum();
+    /// Sorts `parts` into the window's units; tells how many it takes.
+    fn sort(&self, parts: &[Part], window: &mut Window) -> usize {
+        window.rows = parts.iter().map(|part| part.rows.len()).sum();
+        let units = window.rows.div_ceil(UNIT_ROWS);
         if window.units.len() < units {
             window.units.resize_with(units, Unit::default);
         }
-        let starts = lots
-            .iter()
-            .flat_map(|lot| (0..rows_of(lot)).step_by(UNIT_ROWS).map(move |start| (lot, start)));
-        let work: Vec<_> = window.units.iter_mut().zip(starts).collect();
-        work.into_par_iter().for_each(|(unit, (lot, start))| {
-            let parts = cut(lot, start..start + UNIT_ROWS);
+        window.units[..units].par_iter_mut().enumerate().for_each(|(i, unit)| {
+            let parts = cut(parts, i * UNIT_ROWS..(i + 1) * UNIT_ROWS);
             let idle = self.sorters.lock().expect("no thread panicked").pop();
             let mut sorter = idle.unwrap_or_else(|| Sorter::new(self.frame));
             unit.fill(&parts, self.frame, self.group, &mut sorter);
@@ -199,20 +193,20 @@ impl<'a> Windows<'a> {
     }
 }
 
-/// Those rows of a lot that are rows `range` of all its parts together.
-fn cut(lot: &[Part], range: Range<usize>) -> Vec<Part> {
-    let mut parts = Vec::with_capacity(lot.len());
+/// Those rows that are rows `range` of all the parts together.
+fn cut(parts: &[Part], range: Range<usize>) -> Vec<Part> {
+    let mut found = Vec::new();
     let mut start = 0;
-    for Part { batch, rows } in lot {
+    for Part { batch, rows } in parts {
         let end = start + rows.len();
         let (from, to) = (range.start.max(start), range.end.min(end));
         if from < to {
             let rows = rows.start + (from - start)..rows.start + (to - start);
-            parts.push(Part { batch: batch.clone(), rows });
+            found.push(Part { batch: batch.clone(), rows });
         }
         start = end;
     }
-    parts
+    found
 }
 
 impl Window {
