@@ -90,7 +90,9 @@ mod tests {
             }
         }
         // Random bytes are stored as they are.
-        let noise: Vec<u8> = (0..100_000_u64).map(|i| (i * i * 0x9e37_79b9 >> 13) as u8).collect();
+        let noise: Vec<u8> = (0..100_000_u64)
+            .map(|i| (i.wrapping_mul(i.wrapping_mul(0x9e37_79b9)) >> 13) as u8)
+            .collect();
         let plain = frame(FrameInfo::new().block_size(BlockSize::Max64KB), &noise);
         assert!(plain_lz4(&plain, noise.len()).as_ref() == Some(&noise));
     }
