@@ -38,7 +38,7 @@ pub(super) struct Arguments {
     /// MiB that the exact answer's fragments may take at a time
     #[arg(long, default_value_t = 512, value_name = "MIB", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=1 << 20))]
     memory: u64,
-    /// Fragments that are binned at a time
+    /// Fragments that are binned at a time, at most
     #[arg(long, default_value_t = 1 << 19, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=1 << 30))]
     window: u64,
 }

@@ -6,16 +6,22 @@
 //! passing a multiple of 2^32. Any run of m samples in a row passes ⌊αm⌋ or ⌈αm⌉
 //! times, for every m, where LK's values have that for aligned powers of two.
 
+use fearless_simd::{Level, Simd};
+
 use crate::error::Result;
 use crate::param::{Param, Values};
+use crate::rop::fast::{
+    Count, FastEngine, FastReferences, FastTracked, Given, Lanes, Loaded, Numbered, Published,
+    Tally, Width, below, is_published,
+};
 use crate::rop::stochastic::{self, COMBINATIONS, METHOD, OPAQUE, ROUNDS, STRATA};
 use crate::rop::tracked::{
     COMPACT, PIXEL_ORDER, PREHASH, REFERENCE, References, SORT, SURFACES, SampleOf, TRACK,
     TrackedSampler, chance_decides_surfaces,
 };
 use crate::rop::{
-    Blueprint, Dither, Family, Frame, Info, OpaquePromise, OrderPromise, Promises, Reference,
-    Stochastic, depth_bits,
+    Blueprint, Dither, Engine, Family, Frame, Info, OpaquePromise, OrderPromise, Probe, Promises,
+    Reference, Stochastic, Threshold, depth_bits,
 };
 
 crate::options! {
@@ -61,12 +67,29 @@ impl Blueprint for Systematic {
     type At<const N: usize> = Stochastic<TrackedSampler<Evenly, N>, N>;
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
-        let references = Evenly {
-            phase: values.choice(PHASE.name),
-            dither: values.choice(DITHER.name),
-            reference: values.choice(REFERENCE.name),
-        };
-        stochastic::with_methods(values, frame, TrackedSampler::new(values, frame, references))
+        let sampler = TrackedSampler::new(values, frame, Evenly::of(values));
+        stochastic::with_methods(values, frame, sampler)
+    }
+
+    fn fast<const N: usize>(
+        values: &Values,
+        frame: &Frame,
+        level: Level,
+    ) -> Result<Option<Box<dyn Engine>>>
+    where
+        Count<N>: Width,
+    {
+        let plain = Self::at::<N>(values, frame)?;
+        let references = Evenly::of(values);
+        let summed_along_the_curve = references.phase == Phase::Sum
+            && references.dither == Dither::Sequence
+            && is_published(values);
+        if summed_along_the_curve {
+            let sampler = FastTracked::<_, _, N>::new(values, Published, Summed);
+            return Ok(Some(Box::new(FastEngine::new(plain, sampler, level))));
+        }
+        let sampler = FastTracked::<_, _, N>::new(values, Given::of(values), references);
+        Ok(Some(Box::new(FastEngine::new(plain, sampler, level))))
     }
 
     fn promises(values: &Values) -> Promises {
@@ -97,6 +120,16 @@ pub struct Evenly {
     phase: Phase,
     dither: Dither,
     reference: Reference,
+}
+
+impl Evenly {
+    fn of(values: &Values) -> Self {
+        Evenly {
+            phase: values.choice(PHASE.name),
+            dither: values.choice(DITHER.name),
+            reference: values.choice(REFERENCE.name),
+        }
+    }
 }
 
 impl References for Evenly {
@@ -141,11 +174,108 @@ impl References for Evenly {
     }
 }
 
+impl<const N: usize> FastReferences<N> for Evenly {
+    type Plain = Evenly;
+    type Kept = Option<u32>;
+
+    fn to_plain(kept: Option<u32>) -> Option<u32> {
+        kept
+    }
+    fn from_plain(kept: &Option<u32>) -> Option<u32> {
+        *kept
+    }
+
+    #[inline(always)]
+    fn passing<S: Simd, L: Lanes<S>, P: Probe>(
+        &self,
+        simd: S,
+        loaded: &Loaded<L>,
+        kept: &mut Option<u32>,
+        samples: Numbered<'_>,
+        tally: &mut Tally<'_, P>,
+    ) -> u64 {
+        let Numbered { of, first, count } = samples;
+        if count == 0 {
+            return 0;
+        }
+        let threshold = of.opacity.value() as u32;
+        let earlier = threshold.wrapping_mul(of.round.index * N as u32);
+        let xi = match *kept {
+            Some(phase) if self.phase == Phase::Sum => phase,
+            _ => {
+                tally.hashed(1);
+                let xi = self.dither.value(of.site, of.key, self.reference);
+                if self.phase == Phase::Sum { xi.wrapping_add(earlier) } else { xi }
+            }
+        };
+        // Phases of a run of samples are even steps on; `first` is where it starts.
+        let start = match self.phase {
+            Phase::Sum => xi,
+            Phase::Count => xi.wrapping_add(earlier).wrapping_add(threshold.wrapping_mul(first)),
+        };
+        let end = start.wrapping_add(threshold.wrapping_mul(count));
+        *kept = Some(if self.phase == Phase::Sum { end } else { xi });
+        evenly(simd, loaded, start, of.opacity)
+    }
+}
+
+/// Which of a run of samples pass whose phases follow `start` in even steps.
+#[inline(always)]
+fn evenly<S: Simd, L: Lanes<S>>(
+    simd: S,
+    loaded: &Loaded<L>,
+    start: u32,
+    opacity: Threshold,
+) -> u64 {
+    let threshold = opacity.value() as u32;
+    let steps = loaded.lanes.mul(L::splat(simd, threshold as i32));
+    let first = L::splat(simd, start.wrapping_add(threshold) as i32);
+    below(simd, steps.add(first), opacity.value())
+}
+
+/// [`Evenly`] with the parameters that it has by default, known when the kernel is
+/// compiled, and without a branch that chance decides.
+#[derive(Clone, Copy, Debug)]
+pub struct Summed;
+
+impl<const N: usize> FastReferences<N> for Summed {
+    type Plain = Evenly;
+    /// The phase after the surface's last sample, and whether there was one.
+    type Kept = (u32, bool);
+
+    fn to_plain((phase, begun): (u32, bool)) -> Option<u32> {
+        begun.then_some(phase)
+    }
+    fn from_plain(kept: &Option<u32>) -> (u32, bool) {
+        (kept.unwrap_or_default(), kept.is_some())
+    }
+
+    #[inline(always)]
+    fn passing<S: Simd, L: Lanes<S>, P: Probe>(
+        &self,
+        simd: S,
+        loaded: &Loaded<L>,
+        kept: &mut (u32, bool),
+        samples: Numbered<'_>,
+        tally: &mut Tally<'_, P>,
+    ) -> u64 {
+        let Numbered { of, count, .. } = samples;
+        let (phase, begun) = *kept;
+        tally.hashed(u32::from(!begun && count > 0));
+        let threshold = of.opacity.value() as u32;
+        let earlier = threshold.wrapping_mul(of.round.index * N as u32);
+        let xi = Dither::Sequence.value(of.site, of.key, Reference::Lk2011);
+        let start = if begun { phase } else { xi.wrapping_add(earlier) };
+        *kept = (start.wrapping_add(threshold.wrapping_mul(count)), begun || count > 0);
+        evenly(simd, loaded, start, of.opacity)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::random::Stream;
-    use crate::rop::{PixelIndex, ReferenceKey, Round, Site, Threshold};
+    use crate::rop::{PixelIndex, ReferenceKey, Round, Site};
 
     /// Which of a surface's samples pass, their alphas given fragment by fragment.
     fn passes(phase: Phase, seed: u32, fragments: &[(f32, usize)]) -> Vec<bool> {

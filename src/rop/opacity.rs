@@ -16,7 +16,8 @@ impl Threshold {
     pub fn of(alpha: f32) -> Self {
         // Exact: a single-precision number times a power of two, in double precision.
         let scaled = f64::from(alpha) * 4_294_967_296.0;
-        Threshold(scaled.ceil() as u64)
+        // By way of a signed number, for which processors have an instruction.
+        Threshold(scaled.ceil() as i64 as u64)
     }
 
     /// Whether reference value `x` lets a sample pass.

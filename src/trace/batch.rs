@@ -1,5 +1,6 @@
 //! A run of fragments, column by column, as it stands in a file.
 
+use std::ops::BitAnd;
 use std::sync::Arc;
 
 use arrow_array::types::{
@@ -26,16 +27,16 @@ pub const MAX_BATCH_ROWS: usize = 1 << 22;
 #[derive(Clone, Debug)]
 pub struct Batch {
     len: usize,
-    x: Column<u16>,
-    y: Column<u16>,
-    coverage: CoverageColumn,
-    z: Column<u32>,
-    dzdx: Column<i32>,
-    dzdy: Column<i32>,
-    colour: [ChannelColumn; 3],
-    alpha: Column<f32>,
-    primitive: Column<u32>,
-    object: Column<u32>,
+    pub(super) x: Column<u16>,
+    pub(super) y: Column<u16>,
+    pub(super) coverage: CoverageColumn,
+    pub(super) z: Column<u32>,
+    pub(super) dzdx: Column<i32>,
+    pub(super) dzdy: Column<i32>,
+    pub(super) colour: [ChannelColumn; 3],
+    pub(super) alpha: Column<f32>,
+    pub(super) primitive: Column<u32>,
+    pub(super) object: Column<u32>,
 }
 
 /// Applies `$f` to the typed column inside a coverage or channel column.
@@ -208,15 +209,18 @@ impl Batch {
             Error::invalid(format_args!("{place}, row {row}"), what, hint)
         };
         let outside = "write coordinates within the frame";
-        if let Some(row) = first(self.x.stored(), |x| u32::from(*x) >= header.width) {
+        // Compared in the columns' own types, of which a vector holds the most.
+        let last = |side: u32| side.wrapping_sub(1).min(u16::MAX.into()) as u16;
+        let (right, bottom) = (last(header.width), last(header.height));
+        if let Some(row) = first(self.x.stored(), |x| *x > right) {
             return Err(bad(row, "x lies outside the frame", outside));
         }
-        if let Some(row) = first(self.y.stored(), |y| u32::from(*y) >= header.height) {
+        if let Some(row) = first(self.y.stored(), |y| *y > bottom) {
             return Err(bad(row, "y lies outside the frame", outside));
         }
         let all = SampleMask::first(header.pattern.samples());
         let row = typed!(&self.coverage, CoverageColumn::{U8, U16, U32, U64}, c => {
-            first(c.stored(), |v| { let v = u64::from(*v); v == 0 || v & !all.0 != 0 })
+            stray(c.stored(), all)
         });
         if let Some(row) = row {
             let hint = "a fragment covers at least one of its pixel's samples and no others";
@@ -247,6 +251,17 @@ fn first<T>(values: &[T], fails: impl Fn(&T) -> bool) -> Option<usize> {
         let any = block.iter().fold(false, |any, v| any | fails(v));
         any.then(|| i * BLOCK + block.iter().position(&fails).unwrap_or(0))
     })
+}
+
+/// The first mask that is empty or names others than `all` samples.
+fn stray<T>(masks: &[T], all: SampleMask) -> Option<usize>
+where
+    T: Native + Default + TryFrom<u64> + BitAnd<Output = T>,
+{
+    let width = u64::MAX >> (64 - 8 * T::TYPE.bytes());
+    let others = T::try_from(!all.0 & width).unwrap_or_default();
+    let none = T::default();
+    first(masks, |mask| *mask == none || *mask & others != none)
 }
 
 /// The first `len` values of `bytes`, without a copy where they are aligned.

@@ -19,6 +19,7 @@ use arrow_ipc::{
 use crate::error::{Error, Result};
 use crate::trace::batch::MAX_BATCH_ROWS;
 use crate::trace::column::{ColumnId, ValueType};
+use crate::trace::decompress::decompress;
 use crate::trace::seal::damaged;
 
 const MAGIC: &[u8; 6] = b"ARROW1";
@@ -352,20 +353,4 @@ impl BatchLayout {
         }
         Ok(Some((*value_type, values)))
     }
-}
-
-/// Decompresses `bytes` to exactly `length` bytes, and never to more.
-fn decompress(codec: CompressionType, bytes: &[u8], length: usize) -> Option<Vec<u8>> {
-    use std::io::Read;
-    match codec {
-        CompressionType::ZSTD => zstd::bulk::decompress(bytes, length).ok(),
-        CompressionType::LZ4_FRAME => {
-            let mut output = Vec::with_capacity(length);
-            let mut decoder = lz4_flex::frame::FrameDecoder::new(bytes).take(length as u64 + 1);
-            decoder.read_to_end(&mut output).ok()?;
-            Some(output)
-        }
-        _ => None,
-    }
-    .filter(|output| output.len() == length)
 }

@@ -12,6 +12,8 @@ compile_error!("traces are little-endian and are read without conversion");
 mod batch;
 mod column;
 mod content;
+mod decode;
+mod decompress;
 mod fragment;
 mod header;
 mod layout;
@@ -22,6 +24,7 @@ mod write;
 
 pub use batch::{Batch, MAX_BATCH_ROWS};
 pub use column::{ChannelColumn, Column, ColumnId, CoverageColumn, Native, Scalar, ValueType};
+pub(crate) use decode::{BLOCK, Decoder, Footprints};
 pub use fragment::{DepthPlane, Fragment, MAX_SAMPLES, SampleMask, Unorm32};
 pub use header::{ColourFormat, FORMAT_VERSION, Header, MAX_SIDE, SamplePattern};
 pub use read::Trace;

@@ -58,7 +58,7 @@ impl Storage {
             Storage::File(_) if length == 0 => Ok(Bytes::new()),
             Storage::File(file) => {
                 let mut options = MmapOptions::new();
-                options.offset(offset).len(length).populate();
+                options.offset(offset).len(length);
                 // SAFETY: the map is read-only. Another process that changes the file
                 // could change bytes behind the slice; the type's documentation
                 // forbids that, as there is no way to prevent it.
@@ -104,7 +104,7 @@ impl Trace {
     fn read(place: String, storage: Storage, length: usize) -> Result<Self> {
         let file = match &storage {
             Storage::Memory(bytes) => bytes.clone(),
-            // Without populating: only the head and the footer are touched.
+            // Only the head and the footer are touched.
             Storage::File(_) if length == 0 => Bytes::new(),
             Storage::File(file) => {
                 // SAFETY: as in `Storage::bytes`.

@@ -105,8 +105,11 @@ fn hashed<S: Simd, L: Lanes<S>, P: Probe, const N: usize>(
     // Below 2^6 · 2^3 of the index are the numbers, above them the pixel: its bits
     // reversed are joined without a carry.
     let base = u64::from(round.index * N as u32) + u64::from(key.pixel.0) * u64::from(total);
-    let moved =
-        key.surface.wrapping_add(scatter(key.seed)).wrapping_add(scatter((base >> 32) as u32));
+    let mut moved = key.surface.wrapping_add(scatter(key.seed));
+    // On frames of more than 2^32 samples.
+    if base >> 32 != 0 {
+        moved = moved.wrapping_add(scatter((base >> 32) as u32));
+    }
     let place = L::splat(simd, (base as u32).reverse_bits() as i32);
     let place = loaded.reversed.or(place);
     let values = match reference {

@@ -1,16 +1,19 @@
 //! Replaying a trace through a design: streamed, binned by tile, tiles in
 //! parallel.
 //!
-//! A window of fragments is read and sorted into tiles while the window before
-//! it is drawn. Within a tile, fragments stay in API order and one thread draws
-//! them, so that neither the number of threads nor the size of the windows
-//! changes a bit of the result. Memory is that of the touched tiles' state and of
-//! two windows. A design whose state grows with the fragments is given the trace
-//! several times, for groups of tiles that fit into the memory limit.
+//! While a window of fragments is drawn, the next is sorted into tiles and the one
+//! after that is read; each of the three is parallel in itself. Within a tile,
+//! fragments stay in API order and one thread draws them, so that neither the number
+//! of threads nor the size of the windows changes a bit of the result. Memory is that
+//! of the touched tiles' state and of a few windows, which are small: what is sorted
+//! should still lie in a cache when it is drawn. A design whose state grows with the
+//! fragments is given the trace several times, for groups of tiles that fit into the
+//! memory limit.
 
 mod engine;
 mod explain;
 mod group;
+mod unit;
 mod window;
 
 use fearless_simd::Level;
@@ -25,8 +28,8 @@ use crate::rop::design::{Frame, StateBits};
 use crate::rop::event::EventCounts;
 use crate::rop::fast::levels;
 use crate::rop::replay::group::{Group, group_tiles};
-use crate::rop::replay::window::Windows;
-use crate::tile::TileMap;
+use crate::rop::replay::window::{Window, Windows};
+use crate::tile::{TileId, TileMap};
 use crate::trace::Trace;
 
 crate::options! {
@@ -77,7 +80,7 @@ pub struct ReplayOptions<'a> {
     pub engine: Which,
     /// Whether to count events.
     pub count_events: bool,
-    /// Fragments that are binned at a time, at least 1.
+    /// Fragments that are binned at a time, at most.
     pub window: usize,
     /// Bytes that the state of a design may take that grows with the fragments.
     pub memory: u64,
@@ -132,26 +135,34 @@ pub fn replay(
     let mut events = options.count_events.then(EventCounts::default);
     let total = trace.rows() * u64::from(design.passes()) * groups.len() as u64;
     let mut done = 0;
+    let (mut window, mut ahead) = (Window::default(), Window::default());
     for group in &groups {
-        let mut states: TileMap<TileState> = TileMap::new(grid);
+        let mut states: TileMap<Option<TileState>> = TileMap::new(grid);
         for pass in 0..design.passes() {
-            let mut windows = Windows::new(trace, frame, group, options.window.max(1));
-            let mut next = windows.next_binned();
-            while let Some(window) = next.transpose()? {
-                let (drawn, ahead) = rayon::join(
+            let mut windows = Windows::new(trace, frame, group, options.window)?;
+            let mut more = windows.fill(&mut window)?;
+            while more {
+                let (drawn, filled) = rayon::join(
                     || window.draw(design, frame, pass, &mut states, options.count_events),
-                    || windows.next_binned(),
+                    || windows.fill(&mut ahead),
                 );
                 events = events.map(|events| events.merged(&drawn));
-                next = ahead;
                 done += window.rows as u64;
                 (options.progress)(done, total);
+                more = filled?;
+                std::mem::swap(&mut window, &mut ahead);
             }
             let tiles = states.touched_mut().par_iter_mut();
-            tiles.for_each(|(tile, state)| design.end_pass(pass, grid, *tile, state));
+            tiles.for_each(|(tile, state)| {
+                let state = state.as_mut().expect("it has been drawn to");
+                design.end_pass(pass, grid, *tile, state);
+            });
         }
         let resolved = states.map(|tiles| {
-            let resolve = |(tile, state)| (tile, design.resolve(grid, tile, &state));
+            let resolve = |(tile, state): (TileId, Option<TileState>)| {
+                let state = state.expect("it has been drawn to");
+                (tile, design.resolve(grid, tile, &state))
+            };
             tiles.into_par_iter().map(resolve).collect()
         });
         merge(&mut finished, resolved, group);

@@ -1,6 +1,11 @@
-//! Windows of fragments: read, binned by tile, drawn.
+//! Windows of fragments, in three stages that run at the same time: one window is drawn
+//! while the next is sorted and the batches of the one after that are read. Each stage
+//! is parallel in itself.
 
-use arrayvec::ArrayVec;
+use std::collections::VecDeque;
+use std::ops::Range;
+use std::sync::Mutex;
+
 use rayon::prelude::*;
 
 use crate::error::Result;
@@ -8,8 +13,20 @@ use crate::rop::design::Frame;
 use crate::rop::event::EventCounts;
 use crate::rop::replay::engine::{Engine, TileState, Told};
 use crate::rop::replay::group::Group;
+use crate::rop::replay::unit::{Part, Sorter, UNIT_ROWS, Unit};
 use crate::tile::{TileId, TileMap};
-use crate::trace::{Batch, Fragment, SampleMask, Trace};
+use crate::trace::Trace;
+
+/// Fragments of a window for each thread: two windows' worth are held, decoded, and
+/// what stays in the nearer caches between sorting and drawing is worth more than
+/// visiting a tile less often.
+const ROWS_PER_THREAD: usize = 1 << 15;
+/// Fragments of a window, at most, however many threads there are: bounds the memory.
+const WINDOW_ROWS: usize = 1 << 19;
+
+/// Fragments that are read ahead for each thread: a batch of the usual size, so that all
+/// threads can read at once.
+const AHEAD_PER_THREAD: usize = 1 << 16;
 
 /// Cuts a trace into windows of fragments.
 pub(super) struct Windows<'a> {
@@ -17,123 +34,180 @@ pub(super) struct Windows<'a> {
     frame: &'a Frame,
     group: &'a Group,
     length: usize,
-    next_batch: usize,
-    /// What the last window left of its last batch.
-    rest: Option<(Batch, usize)>,
-    /// By tile, for counting: fragments in this window, then the place of the next.
-    cursors: Vec<u32>,
+    ahead: usize,
+    /// The next batch to read.
+    next: usize,
+    /// What has been read and not sorted, and how many rows that is.
+    queue: VecDeque<Part>,
+    queued: usize,
+    /// One for each thread that ever sorted at the same time.
+    sorters: Mutex<Vec<Sorter>>,
+    /// A tile's place in the window's `work` plus one; all zero between windows.
+    places: Vec<u32>,
 }
 
 /// A window's fragments, sorted into tiles.
+#[derive(Default)]
 pub(super) struct Window {
-    /// Batches and the row at which each begins in this window.
-    parts: Vec<Part>,
-    /// How many fragments it was made of.
+    /// How many rows it was made of.
     pub rows: usize,
-    /// Tiles with fragments, in rising order, and where theirs end in `rows_by_tile`.
-    tiles: Vec<(TileId, u32)>,
-    /// Window rows, tile after tile, in API order within a tile.
-    rows_by_tile: Vec<u32>,
+    units: Vec<Unit>,
+    /// Tiles with fragments, in the order in which they were met.
+    work: Vec<Work>,
+    runs: Vec<Run>,
 }
 
-struct Part {
-    batch: Batch,
-    /// The batch's first row that belongs to the window.
-    first: usize,
-    /// That row's number in the window.
-    start: usize,
-    /// The number after the part's last row.
-    end: usize,
+/// A tile's fragments: the first and the last of its runs.
+struct Work {
+    tile: TileId,
+    first: u32,
+    last: u32,
+}
+
+/// A tile's fragments in one unit, and the run in the next unit that has some, or itself.
+struct Run {
+    unit: u32,
+    range: Range<u32>,
+    next: u32,
 }
 
 impl<'a> Windows<'a> {
-    pub fn new(trace: &'a Trace, frame: &'a Frame, group: &'a Group, length: usize) -> Self {
-        let cursors = vec![0; frame.grid.count()];
-        // Window rows are numbered in 32 bits.
-        let length = length.min(1 << 30);
-        Windows { trace, frame, group, length, next_batch: 0, rest: None, cursors }
+    /// Windows of at most `length` fragments of `group`.
+    ///
+    /// # Errors
+    /// As [`Trace::batch`].
+    pub fn new(
+        trace: &'a Trace,
+        frame: &'a Frame,
+        group: &'a Group,
+        length: usize,
+    ) -> Result<Self> {
+        let threads = rayon::current_num_threads();
+        let length = length.clamp(1, WINDOW_ROWS.min(ROWS_PER_THREAD * threads));
+        let mut windows = Windows {
+            trace,
+            frame,
+            group,
+            length,
+            ahead: length.max(WINDOW_ROWS.min(AHEAD_PER_THREAD * threads)),
+            next: 0,
+            queue: VecDeque::new(),
+            queued: 0,
+            sorters: Mutex::default(),
+            places: vec![0; frame.grid.count()],
+        };
+        let batches = windows.plan();
+        windows.queue = windows.read(batches)?.into();
+        Ok(windows)
     }
 
-    /// The next window, or the error that reading it met; `None` at the end.
-    pub fn next_binned(&mut self) -> Option<Result<Window>> {
-        let mut parts: Vec<Part> = Vec::new();
-        let mut rows = 0;
-        while rows < self.length {
-            let (batch, first) = match self.rest.take() {
-                Some(rest) => rest,
-                None if self.next_batch < self.trace.batch_count() => {
-                    self.next_batch += 1;
-                    match self.trace.batch(self.next_batch - 1) {
-                        Ok(batch) => (batch, 0),
-                        Err(e) => return Some(Err(e)),
-                    }
+    /// Fills `window` with the next fragments, reading ahead; `false` at the end.
+    ///
+    /// # Errors
+    /// As [`Trace::batch`].
+    pub fn fill(&mut self, window: &mut Window) -> Result<bool> {
+        let parts = self.take();
+        let batches = self.plan();
+        let this = &*self;
+        let (units, read) = rayon::join(|| this.sort(&parts, window), || this.read(batches));
+        self.queue.extend(read?);
+        self.chain(window, units);
+        Ok(!parts.is_empty())
+    }
+
+    /// A window's worth of what has been read.
+    fn take(&mut self) -> Vec<Part> {
+        let (mut parts, mut rows) = (Vec::new(), 0);
+        while rows < self.length
+            && let Some(Part { batch, rows: left }) = self.queue.pop_front()
+        {
+            let cut = left.end.min(left.start + self.length - rows);
+            if cut < left.end {
+                self.queue.push_front(Part { batch: batch.clone(), rows: cut..left.end });
+            }
+            if left.start < cut {
+                rows += cut - left.start;
+                parts.push(Part { batch, rows: left.start..cut });
+            }
+        }
+        self.queued -= rows;
+        parts
+    }
+
+    /// The batches to read now: none where what has been read makes a window.
+    fn plan(&mut self) -> Range<usize> {
+        let first = self.next;
+        let wanted = if self.queued < self.length { self.ahead } else { 0 };
+        while self.queued < wanted && self.next < self.trace.batch_count() {
+            self.queued += self.trace.batch_rows(self.next) as usize;
+            self.next += 1;
+        }
+        first..self.next
+    }
+
+    fn read(&self, batches: Range<usize>) -> Result<Vec<Part>> {
+        let read = |i| self.trace.batch(i).map(|batch| Part { rows: 0..batch.len(), batch });
+        // The first error in the trace's order, whichever was met first.
+        batches.into_par_iter().map(read).collect::<Vec<_>>().into_iter().collect()
+    }
+
+    /// Sorts `parts` into the window's units; tells how many it takes.
+    fn sort(&self, parts: &[Part], window: &mut Window) -> usize {
+        window.rows = parts.iter().map(|part| part.rows.len()).sum();
+        let units = window.rows.div_ceil(UNIT_ROWS);
+        if window.units.len() < units {
+            window.units.resize_with(units, Unit::default);
+        }
+        window.units[..units].par_iter_mut().enumerate().for_each(|(i, unit)| {
+            let parts = cut(parts, i * UNIT_ROWS..(i + 1) * UNIT_ROWS);
+            let idle = self.sorters.lock().expect("no thread panicked").pop();
+            let mut sorter = idle.unwrap_or_else(|| Sorter::new(self.frame));
+            unit.fill(&parts, self.frame, self.group, &mut sorter);
+            self.sorters.lock().expect("no thread panicked").push(sorter);
+        });
+        units
+    }
+
+    /// Strings the tiles' runs together, unit after unit.
+    fn chain(&mut self, window: &mut Window, units: usize) {
+        window.work.clear();
+        window.runs.clear();
+        for (i, unit) in window.units[..units].iter().enumerate() {
+            for (tile, range) in unit.tiles() {
+                let run = window.runs.len() as u32;
+                window.runs.push(Run { unit: i as u32, range, next: run });
+                let place = &mut self.places[tile.0 as usize];
+                if *place == 0 {
+                    window.work.push(Work { tile, first: run, last: run });
+                    *place = window.work.len() as u32;
+                } else {
+                    let work = &mut window.work[*place as usize - 1];
+                    window.runs[work.last as usize].next = run;
+                    work.last = run;
                 }
-                None => break,
-            };
-            let taken = (batch.len() - first).min(self.length - rows);
-            if first + taken < batch.len() {
-                self.rest = Some((batch.clone(), first + taken));
             }
-            parts.push(Part { batch, first, start: rows, end: rows + taken });
-            rows += taken;
         }
-        (rows > 0).then(|| Ok(self.bin(parts, rows)))
-    }
-
-    /// A counting sort by tile, stable in API order.
-    fn bin(&mut self, parts: Vec<Part>, rows: usize) -> Window {
-        let cursors = &mut self.cursors;
-        let mut tiles: Vec<(TileId, u32)> = Vec::new();
-        for_each_row(&parts, self.frame, self.group, |tile, _| {
-            let count = &mut cursors[tile.0 as usize];
-            if *count == 0 {
-                tiles.push((tile, 0));
-            }
-            *count += 1;
-        });
-        tiles.sort_unstable();
-        let mut end = 0;
-        for (tile, tile_end) in &mut tiles {
-            let cursor = &mut cursors[tile.0 as usize];
-            let count = std::mem::replace(cursor, end);
-            end += count;
-            *tile_end = end;
-        }
-        let mut rows_by_tile = vec![0; end as usize];
-        for_each_row(&parts, self.frame, self.group, |tile, row| {
-            let cursor = &mut cursors[tile.0 as usize];
-            rows_by_tile[*cursor as usize] = row;
-            *cursor += 1;
-        });
-        for (tile, _) in &tiles {
-            cursors[tile.0 as usize] = 0;
-        }
-        Window { parts, rows, tiles, rows_by_tile }
-    }
-}
-
-/// Tells tile and window row of every fragment of a window that covers a sample
-/// of the frame and belongs to the group.
-#[inline]
-fn for_each_row(parts: &[Part], frame: &Frame, group: &Group, mut each: impl FnMut(TileId, u32)) {
-    let mask = SampleMask::first(frame.samples());
-    for part in parts {
-        for row in part.start..part.end {
-            let i = row - part.start + part.first;
-            if (part.batch.coverage(i) & mask).is_empty() {
-                continue;
-            }
-            let (x, y) = part.batch.pixel(i);
-            let tile = frame.grid.tile(x, y);
-            if group.holds(tile, x, y) {
-                each(tile, row as u32);
-            }
+        for work in &window.work {
+            self.places[work.tile.0 as usize] = 0;
         }
     }
 }
 
-/// Fragments that are decoded at a time: few enough for the nearest cache.
-const CHUNK: usize = 64;
+/// Those rows that are rows `range` of all the parts together.
+fn cut(parts: &[Part], range: Range<usize>) -> Vec<Part> {
+    let mut found = Vec::new();
+    let mut start = 0;
+    for Part { batch, rows } in parts {
+        let end = start + rows.len();
+        let (from, to) = (range.start.max(start), range.end.min(end));
+        if from < to {
+            let rows = rows.start + (from - start)..rows.start + (to - start);
+            found.push(Part { batch: batch.clone(), rows });
+        }
+        start = end;
+    }
+    found
+}
 
 impl Window {
     /// Draws the window's fragments into the tiles' states, tiles in parallel; counts
@@ -143,67 +217,42 @@ impl Window {
         design: &dyn Engine,
         frame: &Frame,
         pass: u32,
-        states: &mut TileMap<TileState>,
+        states: &mut TileMap<Option<TileState>>,
         count: bool,
     ) -> EventCounts {
-        let mut work: Vec<(usize, TileId, &[u32])> = Vec::with_capacity(self.tiles.len());
-        let mut start = 0;
-        for (tile, end) in &self.tiles {
-            let slot = states.touch(*tile, || design.clear(frame.grid, *tile));
-            work.push((slot, *tile, &self.rows_by_tile[start..*end as usize]));
-            start = *end as usize;
+        // Tiles are lent to the threads that draw them; new ones are cleared there.
+        let mut lent = Vec::with_capacity(self.work.len());
+        for work in &self.work {
+            let slot = states.touch(work.tile, || None);
+            lent.push((states.touched_mut()[slot].1.take(), work, slot));
         }
-        work.sort_unstable_by_key(|(slot, ..)| *slot);
-        let mut tiles = Vec::with_capacity(work.len());
-        let (mut rest, mut skipped) = (states.touched_mut(), 0);
-        for (slot, _, rows) in work {
-            let (tile, later) = rest[slot - skipped..].split_first_mut().expect("it is touched");
-            tiles.push((&mut tile.1, rows));
-            (rest, skipped) = (later, slot + 1);
-        }
-        let mask = SampleMask::first(frame.samples());
-        let draw_tile = |(state, rows): (&mut TileState, &[u32])| {
+        let draw_tile = |(state, work, _): &mut (Option<TileState>, &Work, usize)| {
             let mut counts = count.then(EventCounts::default);
-            let mut decoder = Decoder { window: self, part: 0, mask };
-            let mut fragments = ArrayVec::<Fragment, CHUNK>::new();
-            for rows in rows.chunks(CHUNK) {
-                fragments.clear();
-                decoder.decode(rows, &mut fragments);
+            let state = state.get_or_insert_with(|| design.clear(frame.grid, work.tile));
+            let mut next = work.first;
+            loop {
+                let run = &self.runs[next as usize];
                 let told = counts.as_mut().map_or(Told::Nobody, Told::Counts);
-                design.draw(pass, state, &fragments, told);
+                let fragments = self.units[run.unit as usize].fragments(run.range.clone());
+                design.draw(pass, state, fragments, told);
+                if next == work.last {
+                    break counts.unwrap_or_default();
+                }
+                next = run.next;
             }
-            counts.unwrap_or_default()
         };
-        if count {
+        let events = if count {
             let merge = |a: EventCounts, b: EventCounts| a.merged(&b);
-            return tiles.into_par_iter().map(draw_tile).reduce(EventCounts::default, merge);
+            lent.par_iter_mut().map(draw_tile).reduce(EventCounts::default, merge)
+        } else {
+            lent.par_iter_mut().for_each(|tile| {
+                draw_tile(tile);
+            });
+            EventCounts::default()
+        };
+        for (state, _, slot) in lent {
+            states.touched_mut()[slot].1 = state;
         }
-        tiles.into_par_iter().for_each(|tile| {
-            draw_tile(tile);
-        });
-        EventCounts::default()
-    }
-}
-
-/// Reads a window's rows in rising order.
-struct Decoder<'a> {
-    window: &'a Window,
-    /// The part that held the last row.
-    part: usize,
-    mask: SampleMask,
-}
-
-impl Decoder<'_> {
-    fn decode(&mut self, rows: &[u32], fragments: &mut ArrayVec<Fragment, CHUNK>) {
-        for row in rows {
-            let row = *row as usize;
-            while row >= self.window.parts[self.part].end {
-                self.part += 1;
-            }
-            let part = &self.window.parts[self.part];
-            let mut fragment = part.batch.fragment(row - part.start + part.first);
-            fragment.coverage = fragment.coverage & self.mask;
-            fragments.push(fragment);
-        }
+        events
     }
 }
