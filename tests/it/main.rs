@@ -4,6 +4,7 @@ mod blended;
 mod cli;
 mod conformance;
 mod events;
+mod fast;
 mod golden;
 mod guarantees;
 mod hostile;

@@ -63,6 +63,23 @@ fn one_by_one<S: Simd, L: Lanes<S>>(simd: S, keys: L, words: &[i32], among: u64)
     ranks
 }
 
+/// [`ranks`] of any keys whatever.
+#[inline(always)]
+pub fn ranks_of_any<S: Simd, L: Lanes<S>>(simd: S, keys: L, words: &[i32], among: u64) -> L {
+    let mut ranks = L::splat(simd, LAST);
+    let one = L::splat(simd, 1);
+    let mut left = among;
+    while left != 0 {
+        let j = left.trailing_zeros() as usize % L::LEN;
+        left &= left - 1;
+        let other = L::splat(simd, words[j]);
+        let beyond = L::bits(keys.greater(other));
+        let equal_and_later = !L::bits(other.greater(keys)) & (!0 << j << 1);
+        ranks = L::select(L::mask(simd, beyond | equal_and_later), ranks.sub(one), ranks);
+    }
+    ranks
+}
+
 /// [`ranks`] in the order of the lanes.
 #[inline(always)]
 pub fn in_sample_order<S: Simd, L: Lanes<S>>(simd: S, among: u64) -> L {
@@ -90,48 +107,42 @@ mod tests {
     use crate::random::Stream;
     use crate::rop::fast::lanes::{Count, Width, levels};
 
-    /// Which lanes are picked, by the vectors and by sorting.
-    fn both_ways<const N: usize>(
-        level: Level,
-        keys: &[i32; N],
+    #[derive(Clone, Copy, PartialEq, Debug)]
+    enum Order {
+        Sorted,
+        SortedAny,
+        Lanes,
+    }
+
+    struct Case {
+        keys: Vec<i32>,
         among: u64,
         hits: u64,
-        sort: bool,
-    ) -> [u64; 2]
-    where
-        Count<N>: Width,
-    {
-        #[inline(always)]
-        fn vectors<S: Simd, W: Width>(
-            simd: S,
-            words: &[i32],
-            among: u64,
-            hits: u64,
-            sort: bool,
-        ) -> u64 {
-            let keys = <W::Lanes<S> as Lanes<S>>::load(simd, words);
-            let ranks =
-                if sort { ranks(simd, keys, words, among) } else { in_sample_order(simd, among) };
-            let among = <W::Lanes<S> as Lanes<S>>::mask(simd, among);
-            <W::Lanes<S> as Lanes<S>>::bits(picked(simd, hits, ranks, among))
+        order: Order,
+    }
+
+    #[inline(always)]
+    fn by_vectors<S: Simd, L: Lanes<S>>(simd: S, case: &Case) -> u64 {
+        let keys = L::load(simd, &case.keys);
+        let ranks = match case.order {
+            Order::Sorted => ranks(simd, keys, &case.keys, case.among),
+            Order::SortedAny => ranks_of_any(simd, keys, &case.keys, case.among),
+            Order::Lanes => in_sample_order(simd, case.among),
+        };
+        L::bits(picked(simd, case.hits, ranks, L::mask(simd, case.among)))
+    }
+
+    fn by_level<W: Width>(level: Level, case: &Case) -> u64 {
+        crate::for_level!(level, simd => by_vectors::<_, W::Lanes<_>>(simd, case))
+    }
+
+    fn by_sorting(case: &Case) -> u64 {
+        let mut lanes: Vec<usize> = (0..64).filter(|i| case.among >> i & 1 == 1).collect();
+        if case.order != Order::Lanes {
+            lanes.sort_by_key(|i| (case.keys[*i], *i));
         }
-        fn dispatched<W: Width>(
-            level: Level,
-            words: &[i32],
-            among: u64,
-            hits: u64,
-            sort: bool,
-        ) -> u64 {
-            crate::for_level!(level, simd => vectors::<_, W>(simd, words, among, hits, sort))
-        }
-        let row = Count::<N>::row(|i| keys.get(i).copied().unwrap_or(0));
-        let mut order: Vec<usize> = (0..N).filter(|i| among >> i & 1 == 1).collect();
-        if sort {
-            order.sort_by_key(|i| (keys[*i], *i));
-        }
-        let chosen = order.iter().enumerate().filter(|(n, _)| hits >> n & 1 == 1);
-        let expected = chosen.fold(0, |mask, (_, i)| mask | 1 << i);
-        [dispatched::<Count<N>>(level, row.as_ref(), among, hits, sort), expected]
+        let chosen = lanes.iter().enumerate().filter(|(n, _)| case.hits >> n & 1 == 1);
+        chosen.fold(0, |mask, (_, i)| mask | 1 << i)
     }
 
     fn check<const N: usize>()
@@ -139,23 +150,32 @@ mod tests {
         Count<N>: Width,
     {
         let mut random = Stream::new([N as u32]);
-        for case in 0..400 {
+        let lanes = N.max(4);
+        for round in 0..400 {
             // From all equal to all different, and the ends of the range.
-            let kinds = 1 + random.below(1 << (case % 9));
-            let keys: [i32; N] = std::array::from_fn(|_| match random.below(kinds) {
+            let kinds = 1 + random.below(1 << (round % 9));
+            let least = i32::MIN + random.below(3) as i32;
+            let mut key = || match random.below(kinds) {
                 0 => i32::MAX,
-                1 => i32::MIN + 2,
+                1 => least,
                 other => (other as i32).wrapping_mul(0x1234_5677) | 1 << 8,
-            });
-            let word = |r: &mut Stream| u64::from(r.word()) << 32 | u64::from(r.word());
+            };
+            let keys: Vec<i32> = (0..lanes).map(|_| key()).collect();
+            let mut word = || u64::from(random.word()) << 32 | u64::from(random.word());
             let all = u64::MAX >> (64 - N);
-            let among = [all, word(&mut random) & all, 1 << random.below(N as u32), 0]
-                [random.below(4) as usize];
-            let hits = word(&mut random);
-            for level in levels() {
-                for sort in [true, false] {
-                    let [fast, plain] = both_ways(level, &keys, among, hits, sort);
-                    assert_eq!(fast, plain, "{level:?} {sort} {keys:?} {among:#x} {hits:#x}");
+            let (among, hits) = ([all, word() & all, 1 << (word() % N as u64), 0], word());
+            for order in [Order::Sorted, Order::SortedAny, Order::Lanes] {
+                if order == Order::Sorted && least < i32::MIN + 2 {
+                    continue;
+                }
+                for among in among {
+                    let case = Case { keys: keys.clone(), among, hits, order };
+                    for level in levels() {
+                        let found = by_level::<Count<N>>(level, &case);
+                        let Case { keys, .. } = &case;
+                        let place = format!("{level:?} {order:?} {keys:?} {among:#x} {hits:#x}");
+                        assert_eq!(found, by_sorting(&case), "{place}");
+                    }
                 }
             }
         }

@@ -7,7 +7,7 @@ use crate::rop::design::Site;
 use crate::rop::event::Probe;
 use crate::rop::fast::engine::{FastSampler, Loaded, Offered};
 use crate::rop::fast::lanes::Lanes;
-use crate::rop::fast::rank::{in_sample_order, picked, ranks};
+use crate::rop::fast::rank::{in_sample_order, picked, ranks, ranks_of_any};
 use crate::rop::fast::references::{FastReferences, Numbered};
 use crate::rop::fast::tally::Tally;
 use crate::rop::opacity::Threshold;
@@ -281,8 +281,13 @@ impl<R: Rules, F: FastReferences<N>, const N: usize> FastSampler<N> for FastTrac
             }
         }
 
-        // 9: which sample has which number.
-        let ranks = if sort { ranks(simd, stored, words, s) } else { in_sample_order(simd, s) };
+        // 9: which sample has which number. A sample that passed lies behind the fragment,
+        // which is not at the near end; others may hold any depth.
+        let ranks = match (sort, compact) {
+            (true, true) => ranks(simd, stored, words, s),
+            (true, false) => ranks_of_any(simd, stored, words, s),
+            (false, _) => in_sample_order(simd, s),
+        };
         picked(simd, hits, ranks, L::mask(simd, passed))
     }
 }

@@ -1,0 +1,160 @@
+//! The fast engines give the bits of the plain text: state, events and picture.
+
+use screendoor::design::{Configured, DESIGNS};
+use screendoor::random::Stream;
+use screendoor::rop::{EventCounts, Frame, Site, Told, Which};
+use screendoor::tile::{TileGrid, TileId};
+use screendoor::trace::{DepthPlane, Fragment, Header, SampleMask, Unorm32};
+
+use crate::util::{header, trace, variants};
+
+/// The engines that this machine can run, but for the reference.
+fn engines() -> Vec<Which> {
+    let all = [Which::Avx512, Which::Avx2, Which::Sse2, Which::Neon, Which::Portable];
+    all.into_iter().filter(|which| which.level().is_ok()).collect()
+}
+
+/// Fragments that crowd a few pixels of one tile: depths from a handful of levels or
+/// anywhere, flat, sloped and very steep planes, the ends of the depth range, all
+/// kinds of masks, alpha 0, tiny, middling and 1.
+fn crowd(header: &Header, count: usize, seed: u32) -> Vec<Fragment> {
+    let mut random = Stream::new([0xfa57, seed]);
+    let all = SampleMask::first(header.pattern.samples());
+    let fragment = |i: usize| {
+        let z = match random.below(8) {
+            0 => 0,
+            1 => random.below(20),
+            2 => u32::MAX - random.below(20),
+            3 | 4 => (1 + random.below(4)) << 29,
+            5 => (1 << 31) + random.below(16),
+            _ => random.word(),
+        };
+        let mut slope = || match random.below(6) {
+            0 | 1 => 0,
+            2 => random.below(64) as i32 - 32,
+            3 => random.word() as i32 >> 8,
+            4 => random.word() as i32 >> 4,
+            _ => random.word() as i32,
+        };
+        let (dzdx, dzdy) = (slope(), slope());
+        let bits = u64::from(random.word()) << 32 | u64::from(random.word());
+        let mask = match random.below(4) {
+            0 => all,
+            1 => SampleMask(1 << random.below(header.pattern.samples())),
+            _ => SampleMask(bits) & all,
+        };
+        let alpha = match random.below(6) {
+            0 => 1.0,
+            1 => 0.0,
+            2 => 1e-9,
+            _ => random.unit(),
+        };
+        Fragment {
+            x: random.below(4) as u16,
+            y: 0,
+            coverage: if mask.is_empty() { all } else { mask },
+            depth: DepthPlane { z: Unorm32(z), dzdx, dzdy },
+            colour: [random.unit(), -random.unit(), i as f32],
+            alpha,
+            primitive: random.below(5),
+            object: random.below(2),
+        }
+    };
+    (0..count).map(fragment).collect()
+}
+
+/// What an engine makes of fragments: what each pixel holds after each pass, what was
+/// counted, and the colours.
+fn run(
+    design: &Configured,
+    frame: &Frame,
+    which: Which,
+    fragments: &[Fragment],
+) -> (Vec<screendoor::rop::Contents>, EventCounts, Vec<[u64; 3]>) {
+    let engine = design.build(frame, which).unwrap();
+    let (grid, tile) = (frame.grid, TileId(0));
+    let mut counts = EventCounts::default();
+    let mut held = Vec::new();
+    // Once counting, once not: kernels are compiled for both.
+    let mut counted = engine.clear(grid, tile);
+    let mut uncounted = engine.clear(grid, tile);
+    for pass in 0..engine.passes() {
+        // In two parts, as windows cut them.
+        for part in fragments.chunks(fragments.len() / 2 + 1) {
+            engine.draw(pass, &mut counted, part, Told::Counts(&mut counts));
+            engine.draw(pass, &mut uncounted, part, Told::Nobody);
+        }
+        engine.end_pass(pass, grid, tile, &mut counted);
+        engine.end_pass(pass, grid, tile, &mut uncounted);
+        for within in 0..5 {
+            held.push(engine.contents(&counted, within));
+            held.push(engine.contents(&uncounted, within));
+        }
+    }
+    let colours = [&counted, &uncounted].map(|state| engine.resolve(grid, tile, state));
+    let bits = colours.iter().flat_map(|tile| tile.iter().map(|c| c.map(f64::to_bits)));
+    (held, counts, bits.collect())
+}
+
+/// Holds all engines of all variants of a design against its plain text.
+fn check(name: &str, samples: u32, cases: u32) {
+    let header = Header { background: [0.1, 0.2, 0.3], ..header(40, 40, samples) };
+    let empty = trace(&header, &[]);
+    let entry = DESIGNS.iter().find(|entry| entry.info.name == name).unwrap();
+    for (i, design) in variants(entry).into_iter().enumerate() {
+        for case in 0..cases {
+            let seed = case * 1000 + i as u32;
+            let fragments = crowd(&header, 60, seed);
+            let frame = design.frame(&empty, samples, seed).unwrap();
+            let expected = run(&design, &frame, Which::Reference, &fragments);
+            for which in engines() {
+                let found = run(&design, &frame, which, &fragments);
+                let label = design.label();
+                assert_eq!(found.0, expected.0, "{label} {which:?} {samples}: state");
+                assert_eq!(found.1, expected.1, "{label} {which:?} {samples}: events");
+                assert!(found.2 == expected.2, "{label} {which:?} {samples}: colours");
+            }
+        }
+    }
+}
+
+fn check_counts(name: &str) {
+    for samples in [1, 2, 4, 8, 16, 32, 64] {
+        check(name, samples, 6);
+    }
+}
+
+#[test]
+fn lk_is_its_plain_text() {
+    check_counts("lk");
+}
+
+#[test]
+fn systematic_is_its_plain_text() {
+    check_counts("systematic");
+}
+
+#[test]
+fn enderton_is_its_plain_text() {
+    check_counts("enderton");
+}
+
+#[test]
+fn exact_is_its_plain_text() {
+    check_counts("exact");
+}
+
+#[test]
+fn a_pixel_told_fragment_by_fragment_is_the_same() {
+    // `explain` asks for records; it must see what the picture is made of.
+    let header = header(8, 8, 8);
+    let fragments: Vec<Fragment> = crowd(&header, 80, 7).into_iter().filter(|f| f.x == 0).collect();
+    let trace = trace(&header, &fragments);
+    for name in ["lk", "systematic", "enderton", "exact"] {
+        let design = crate::util::design(name);
+        let explained = design.explain(&trace, 8, 5, Site { x: 0, y: 0 }, &|_, _| ()).unwrap();
+        let picture = crate::util::picture(&design, &trace, 8, 5);
+        assert_eq!(picture.get(0, 0), explained.colour, "{name}");
+        assert_eq!(TileGrid::within(0, 0), 0);
+    }
+}
