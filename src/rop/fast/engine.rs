@@ -170,8 +170,7 @@ where
         };
         match methods.pass(inner) {
             Pass::Sample(round) => {
-                let round = methods.round(round);
-                self.draw_samples(pass, &round, tile, fragments, probe);
+                self.draw_samples(pass, methods.round(round), tile, fragments, probe);
             }
             Pass::Accumulate(_) => self.accumulate(pass, tile, fragments, probe),
             Pass::TotalAlpha => {
@@ -190,7 +189,7 @@ where
     fn draw_samples<P: Probe>(
         &self,
         pass: u32,
-        round: &Round,
+        round: Round,
         tile: &mut FastTile<F, N>,
         fragments: &[Fragment],
         probe: &mut P,

@@ -21,7 +21,7 @@ pub(super) fn draw_samples<S: Simd, F: FastSampler<N>, P: Probe, const N: usize>
     simd: S,
     engine: &FastEngine<F, N>,
     pass: u32,
-    round: &Round,
+    round: Round,
     tile: &mut FastTile<F, N>,
     fragments: &[Fragment],
     probe: &mut P,
@@ -63,8 +63,14 @@ pub(super) fn draw_samples<S: Simd, F: FastSampler<N>, P: Probe, const N: usize>
         if LanesOf::<S, N>::LEN > 8 && passed == 0 && sampler.needs_survivors() {
             continue;
         }
-        let offered =
-            Offered { round, stored, words: held.depth.as_ref(), passed, coverage, fragment };
+        let offered = Offered {
+            round: &round,
+            stored,
+            words: held.depth.as_ref(),
+            passed,
+            coverage,
+            fragment,
+        };
         let state = &mut tile.states[within];
         let written = sampler.choose(simd, &loaded, state, offered, &mut tally);
         let depth = LanesOf::<S, N>::select(written, z, stored);
