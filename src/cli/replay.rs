@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use serde::Serialize;
 
 use crate::cli::arguments::RunArguments;
@@ -12,7 +13,7 @@ use crate::cli::files::{Json, check, report, write_pictures};
 use crate::design::{Configured, REFERENCE, configure};
 use crate::error::Result;
 use crate::metrics::{Ensemble, EnsembleErrors, PixelClasses, Region};
-use crate::param::Values;
+use crate::param::{Options, Values};
 use crate::picture::{Picture, PictureFile};
 use crate::rop::{EventCounts, Promises, ReplayOptions, Replayed, StateBits, Which};
 use crate::trace::Trace;
@@ -35,12 +36,26 @@ pub(super) struct Arguments {
     /// Write the results as JSON to a file, or to standard output for -
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    /// Which implementation draws; all give the same bits
+    #[arg(long, default_value = "fast", value_name = "ENGINE", value_parser = engine())]
+    engine: Which,
     /// MiB that the exact answer's fragments may take at a time
     #[arg(long, default_value_t = 512, value_name = "MIB", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=1 << 20))]
     memory: u64,
     /// Fragments that are binned at a time, at most
     #[arg(long, default_value_t = 1 << 19, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=1 << 30))]
     window: u64,
+}
+
+/// Engines by their names.
+fn engine() -> impl TypedValueParser<Value = Which> {
+    PossibleValuesParser::new(
+        Which::CHOICES.iter().map(|c| PossibleValue::new(c.name).help(c.help)),
+    )
+    .map(|name| {
+        let named = Which::CHOICES.iter().zip(Which::ALL).find(|(c, _)| c.name == name);
+        *named.expect("the parser knows these names").1
+    })
 }
 
 /// The result of one replay command.
@@ -53,6 +68,7 @@ struct Document<'a> {
     promises: Promises,
     samples: u32,
     seed: u32,
+    engine: Which,
     /// Of the first seed's picture: equal hashes are equal pictures.
     picture: String,
     seconds: f64,
@@ -84,7 +100,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let progress = console.progress("replaying", "fragments");
     let watch = |done, total| progress.set(done, total);
     let options = ReplayOptions {
-        engine: Which::Fast,
+        engine: arguments.engine,
         count_events: true,
         window: arguments.window as usize,
         memory: arguments.memory << 20,
@@ -127,6 +143,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         promises: design.promises(),
         samples,
         seed,
+        engine: arguments.engine,
         picture: first.picture.hash(),
         seconds,
         fragments_per_second: events.fragments as f64 / seconds,

@@ -181,7 +181,7 @@ impl<const N: usize> FastReferences<N> for Evenly {
     fn to_plain(kept: Option<u32>) -> Option<u32> {
         kept
     }
-    fn from_plain(kept: &Option<u32>) -> Option<u32> {
+    fn of_plain(kept: &Option<u32>) -> Option<u32> {
         *kept
     }
 
@@ -246,7 +246,7 @@ impl<const N: usize> FastReferences<N> for Summed {
     fn to_plain((phase, begun): (u32, bool)) -> Option<u32> {
         begun.then_some(phase)
     }
-    fn from_plain(kept: &Option<u32>) -> (u32, bool) {
+    fn of_plain(kept: &Option<u32>) -> (u32, bool) {
         (kept.unwrap_or_default(), kept.is_some())
     }
 

@@ -45,7 +45,7 @@ pub trait FastSampler<const N: usize>: Send + Sync + 'static {
     /// A state as the plain text has it.
     fn to_plain(&self, state: Self::State) -> <Self::Plain as Sampler<N>>::State;
     /// The other way.
-    fn from_plain(&self, plain: &<Self::Plain as Sampler<N>>::State) -> Self::State;
+    fn of_plain(&self, plain: &<Self::Plain as Sampler<N>>::State) -> Self::State;
     /// Bits of a stored depth.
     fn depth_bits(&self) -> u32;
     /// Whether a fragment does nothing unless a sample of it passes the depth test.

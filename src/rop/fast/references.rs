@@ -31,7 +31,7 @@ pub trait FastReferences<const N: usize>: Copy + Send + Sync + 'static {
     /// What is kept, as the plain text has it.
     fn to_plain(kept: Self::Kept) -> <Self::Plain as References>::Kept;
     /// The other way.
-    fn from_plain(kept: &<Self::Plain as References>::Kept) -> Self::Kept;
+    fn of_plain(kept: &<Self::Plain as References>::Kept) -> Self::Kept;
 
     /// Which of the samples pass the opacity test: bit `i` for the `i`-th of them.
     /// Bits beyond their count hold anything.
@@ -54,7 +54,7 @@ impl<const N: usize> FastReferences<N> for PublishedHash {
     type Kept = ();
 
     fn to_plain((): ()) {}
-    fn from_plain((): &()) {}
+    fn of_plain((): &()) {}
 
     #[inline(always)]
     fn passing<S: Simd, L: Lanes<S>, P: Probe>(
@@ -74,7 +74,7 @@ impl<const N: usize> FastReferences<N> for Hashed {
     type Kept = ();
 
     fn to_plain((): ()) {}
-    fn from_plain((): &()) {}
+    fn of_plain((): &()) {}
 
     #[inline(always)]
     fn passing<S: Simd, L: Lanes<S>, P: Probe>(

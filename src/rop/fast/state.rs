@@ -103,7 +103,7 @@ where
                 row.as_mut()[s] = channel.to_bits() as i32;
             }
         }
-        self.states[within] = sampler.from_plain(&state);
+        self.states[within] = sampler.of_plain(&state);
         if let Some(slot) = self.sums.get_mut(within) {
             *slot = sums;
         }

@@ -189,7 +189,7 @@ impl<R: Rules, F: FastReferences<N>, const N: usize> FastSampler<N> for FastTrac
         }
     }
 
-    fn from_plain(&self, plain: &TrackedState<<F::Plain as References>::Kept>) -> Self::State {
+    fn of_plain(&self, plain: &TrackedState<<F::Plain as References>::Kept>) -> Self::State {
         let SurfaceTracker { surface_id, numbered, last, .. } = plain.surface;
         let mut more = R::More::default();
         R::keep(&mut more, numbered, last);
@@ -197,7 +197,7 @@ impl<R: Rules, F: FastReferences<N>, const N: usize> FastSampler<N> for FastTrac
             covered: plain.surface.held().0,
             surface: surface_id,
             pixel: plain.pixel_id,
-            kept: F::from_plain(&plain.kept),
+            kept: F::of_plain(&plain.kept),
             more,
         }
     }

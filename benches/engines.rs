@@ -1,0 +1,134 @@
+//! The engines of a design against each other, on one thread, over fragments that are
+//! sorted into tiles already: `cargo bench --bench engines`.
+//!
+//! Every bench first checks that the pictures agree. The plain text of the exact design
+//! is also the usual way to do it: a list for each pixel, sorted by the standard library.
+
+use std::hint::black_box;
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use screendoor::capture::{Capture, CaptureOptions};
+use screendoor::design::{REFERENCE, configure};
+use screendoor::param::Options;
+use screendoor::rop::{Engine, EventCounts, Frame, TileState, Told, Which};
+use screendoor::tile::TileId;
+use screendoor::trace::{Fragment, SampleMask, Trace};
+
+const SCENE: &str = "builtin:engine";
+const SIDE: u32 = 512;
+
+fn captured() -> Trace {
+    let scene = screendoor::scene::load(SCENE).expect("it is built in");
+    let options = CaptureOptions { width: SIDE, height: SIDE, ..CaptureOptions::default() };
+    let capture = Capture::new(&scene, &options).expect("the options are good");
+    capture.to_memory(|_, _| ()).expect("it is captured")
+}
+
+/// The touched tiles' fragments, as the replay hands them out.
+fn binned(trace: &Trace, frame: &Frame) -> Vec<Tile> {
+    let mask = SampleMask::first(frame.samples());
+    let mut tiles = vec![Vec::new(); frame.grid.count()];
+    for batch in trace.batches() {
+        for mut fragment in batch.expect("it reads").iter() {
+            fragment.coverage = fragment.coverage & mask;
+            if !fragment.coverage.is_empty() {
+                tiles[frame.grid.tile(fragment.x, fragment.y).0 as usize].push(fragment);
+            }
+        }
+    }
+    let tiles = tiles.into_iter().enumerate().filter(|(_, fragments)| !fragments.is_empty());
+    tiles.map(|(tile, fragments)| (TileId(tile as u32), fragments)).collect()
+}
+
+/// Which parts of an engine's work are timed.
+#[derive(Clone, Copy, PartialEq)]
+enum Work {
+    /// Clearing and drawing: the kernel.
+    Draw,
+    /// The same, with events counted.
+    Count,
+    /// Clearing, drawing and resolving.
+    Picture,
+}
+
+fn run(engine: &dyn Engine, frame: &Frame, (tile, fragments): &Tile, work: Work) -> TileState {
+    let mut events = EventCounts::default();
+    let mut state = engine.clear(frame.grid, *tile);
+    for pass in 0..engine.passes() {
+        let told = match work {
+            Work::Count => Told::Counts(&mut events),
+            Work::Draw | Work::Picture => Told::Nobody,
+        };
+        engine.draw(pass, &mut state, fragments, told);
+        engine.end_pass(pass, frame.grid, *tile, &mut state);
+    }
+    black_box(events);
+    state
+}
+
+/// A tile and its fragments.
+type Tile = (TileId, Vec<Fragment>);
+
+/// The engines that this machine can run.
+fn engines() -> impl Iterator<Item = (&'static str, Which)> {
+    let all = Which::CHOICES.iter().zip(Which::ALL).map(|(choice, which)| (choice.name, *which));
+    all.filter(|(_, which)| which.level().is_ok() && *which != Which::Portable)
+}
+
+fn bench(c: &mut Criterion, name: &str, counts: &[u32], works: &[(&str, Work)]) {
+    let trace = captured();
+    let design = configure(name, &[]).expect("defaults are good");
+    for samples in counts {
+        let frame = design.frame(&trace, *samples, 1).expect("it has the samples");
+        let tiles = binned(&trace, &frame);
+        let fragments: usize = tiles.iter().map(|(_, fragments)| fragments.len()).sum();
+        let reference = design.build(&frame, Which::Reference).expect("it is built");
+        for (label, which) in engines() {
+            let engine = design.build(&frame, which).expect("it is built");
+            for tile in &tiles {
+                let [a, b] = [&engine, &reference].map(|e| {
+                    let state = run(&**e, &frame, tile, Work::Picture);
+                    e.resolve(frame.grid, tile.0, &state).map(|colour| colour.map(f64::to_bits))
+                });
+                assert_eq!(a, b, "{name}: {label} differs in {:?}", tile.0);
+            }
+            for (part, work) in works {
+                let mut group = c.benchmark_group(format!("{part}/{name}/{samples}"));
+                group.throughput(Throughput::Elements(fragments as u64));
+                group.bench_function(label, |b| {
+                    b.iter(|| {
+                        for tile in &tiles {
+                            let state = run(&*engine, &frame, tile, *work);
+                            if *work == Work::Picture {
+                                black_box(engine.resolve(frame.grid, tile.0, &state));
+                            }
+                            black_box(state);
+                        }
+                    });
+                });
+                group.finish();
+            }
+        }
+    }
+}
+
+fn exact(c: &mut Criterion) {
+    bench(c, REFERENCE, &[1, 8, 64], &[("picture", Work::Picture)]);
+}
+
+fn lk(c: &mut Criterion) {
+    let works = [("draw", Work::Draw), ("count", Work::Count)];
+    bench(c, "lk", &[8], &works);
+    bench(c, "lk", &[1, 2, 4, 16, 32, 64], &works[..1]);
+}
+
+fn systematic(c: &mut Criterion) {
+    bench(c, "systematic", &[8], &[("draw", Work::Draw)]);
+}
+
+criterion_group! {
+    name = benches;
+    config = Criterion::default().sample_size(10);
+    targets = exact, lk, systematic
+}
+criterion_main!(benches);
