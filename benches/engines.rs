@@ -4,15 +4,18 @@
 //! Every bench first checks that the pictures agree. The plain text of the exact design
 //! is also the usual way to do it: a list for each pixel, sorted by the standard library.
 
+use std::fs::File;
 use std::hint::black_box;
+use std::io::{BufWriter, Write};
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use rayon::ThreadPoolBuilder;
 use screendoor::capture::{Capture, CaptureOptions};
 use screendoor::design::{REFERENCE, configure};
 use screendoor::param::Options;
-use screendoor::rop::{Engine, EventCounts, Frame, TileState, Told, Which};
+use screendoor::rop::{Engine, EventCounts, Frame, ReplayOptions, TileState, Told, Which};
 use screendoor::tile::TileId;
-use screendoor::trace::{Fragment, SampleMask, Trace};
+use screendoor::trace::{Fragment, SampleMask, Trace, TraceWriter, WriteOptions};
 
 const SCENE: &str = "builtin:engine";
 const SIDE: u32 = 512;
@@ -112,6 +115,49 @@ fn bench(c: &mut Criterion, name: &str, counts: &[u32], works: &[(&str, Work)]) 
     }
 }
 
+/// From the mapped file to the picture.
+fn replay(c: &mut Criterion) {
+    let folder = tempfile::tempdir().expect("there is room");
+    let path = folder.path().join("engine.arrow");
+    let header = captured().header().clone();
+    let mut file = BufWriter::new(File::create(&path).expect("it is writable"));
+    let mut writer = TraceWriter::new(&mut file, SCENE, header, WriteOptions::default())
+        .expect("the header is good");
+    for batch in captured().batches() {
+        for fragment in batch.expect("it reads").iter() {
+            writer.push(&fragment).expect("it writes");
+        }
+    }
+    writer.finish().expect("it writes");
+    file.flush().expect("it writes");
+    let trace = Trace::open(&path).expect("it opens");
+    let mut group = c.benchmark_group("replay/lk/8");
+    group.throughput(Throughput::Elements(trace.rows()));
+    let design = configure("lk", &[]).expect("defaults are good");
+    for threads in [1, 2] {
+        let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        for (label, which) in [("reference", Which::Reference), ("fast", Which::Fast)] {
+            let options = ReplayOptions { engine: which, ..ReplayOptions::default() };
+            let run = || design.replay(&trace, 8, 1, &options).expect("it replays");
+            group.bench_function(format!("{label}, threads: {threads}"), |b| {
+                b.iter(|| pool.install(run));
+            });
+        }
+    }
+    group.finish();
+}
+
+/// What the machine's memory gives: a sum over more than the caches hold.
+fn stream(c: &mut Criterion) {
+    let words = vec![1_u64; 1 << 25];
+    let mut group = c.benchmark_group("stream");
+    group.throughput(Throughput::Bytes(8 << 25));
+    group.bench_function("read, threads: 1", |b| {
+        b.iter(|| black_box(&words).iter().fold(0_u64, |sum, word| sum.wrapping_add(*word)));
+    });
+    group.finish();
+}
+
 fn exact(c: &mut Criterion) {
     bench(c, REFERENCE, &[1, 8, 64], &[("picture", Work::Picture)]);
 }
@@ -126,9 +172,13 @@ fn systematic(c: &mut Criterion) {
     bench(c, "systematic", &[8], &[("draw", Work::Draw)]);
 }
 
+fn enderton(c: &mut Criterion) {
+    bench(c, "enderton", &[8], &[("draw", Work::Draw)]);
+}
+
 criterion_group! {
     name = benches;
     config = Criterion::default().sample_size(10);
-    targets = exact, lk, systematic
+    targets = stream, lk, systematic, enderton, exact, replay
 }
 criterion_main!(benches);

@@ -17,13 +17,16 @@ pub const fn mix(mut x: u32) -> u32 {
     x ^ (x >> 16)
 }
 
+/// The fraction of the golden ratio, of 2^32: far from any small number.
+pub const GOLDEN: u32 = 0x9e37_79b9;
+
 /// The hash of a list of words; it depends on their order.
 #[inline]
 pub const fn hash<const N: usize>(words: [u32; N]) -> u32 {
-    let mut h = 0x9e37_79b9_u32;
+    let mut h = GOLDEN;
     let mut i = 0;
     while i < N {
-        h = mix((h ^ words[i]).wrapping_add(0x9e37_79b9));
+        h = mix((h ^ words[i]).wrapping_add(GOLDEN));
         i += 1;
     }
     h

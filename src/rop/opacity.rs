@@ -14,10 +14,15 @@ impl Threshold {
     /// The threshold of an alpha in [0, 1].
     #[inline]
     pub fn of(alpha: f32) -> Self {
+        // Of an alpha from 2^-9 up, the bits themselves: all that its mantissa holds are
+        // multiples of 2^-32.
+        let (exponent, mantissa) = (alpha.to_bits() >> 23, alpha.to_bits() & 0x7f_ffff);
+        if let 118..=127 = exponent {
+            return Threshold(u64::from(mantissa | 1 << 23) << (exponent - 118));
+        }
         // Exact: a single-precision number times a power of two, in double precision.
         let scaled = f64::from(alpha) * 4_294_967_296.0;
-        // By way of a signed number, for which processors have an instruction.
-        Threshold(scaled.ceil() as i64 as u64)
+        Threshold(scaled.ceil() as u64)
     }
 
     /// Whether reference value `x` lets a sample pass.
@@ -58,6 +63,12 @@ mod tests {
         assert_eq!(Threshold::of(0.5).value(), 1 << 31);
         assert_eq!(Threshold::of(1.0 - f32::EPSILON / 2.0).value(), (1 << 32) - (1 << 8));
         assert_eq!(Threshold::of(-0.0).value(), 0);
+        // Both ways to a threshold agree where they meet, and all over.
+        for bits in (0..=1.0_f32.to_bits()).step_by(4099).chain(0x3a80_0000 - 9..0x3b80_0000 + 9) {
+            let alpha = f32::from_bits(bits);
+            let expected = (f64::from(alpha) * 4_294_967_296.0).ceil() as u64;
+            assert_eq!(Threshold::of(alpha).value(), expected, "{alpha}");
+        }
     }
 
     #[test]

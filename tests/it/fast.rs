@@ -29,7 +29,8 @@ fn crowd(header: &Header, count: usize, seed: u32) -> Vec<Fragment> {
             5 => (1 << 31) + random.below(16),
             _ => random.word(),
         };
-        let mut slope = || match random.below(6) {
+        let mut slope = || match random.below(7) {
+            6 => [i32::MIN, i32::MAX, 1 << 27, -(1 << 27)][random.below(4) as usize],
             0 | 1 => 0,
             2 => random.below(64) as i32 - 32,
             3 => random.word() as i32 >> 8,

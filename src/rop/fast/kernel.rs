@@ -131,12 +131,13 @@ pub(super) fn accumulate<S: Simd, F: FastSampler<N>, P: Probe, const N: usize>(
 /// for), and not very steep. Nearly all are.
 #[inline(always)]
 fn is_gentle(depth: &DepthPlane) -> bool {
-    let (x, y) = (depth.dzdx.unsigned_abs(), depth.dzdy.unsigned_abs());
+    // Twice 2^31, where both are the steepest there is, would wrap to 0.
+    let slopes = depth.dzdx.unsigned_abs().saturating_add(depth.dzdy.unsigned_abs());
     // Samples lie at most half a pixel from the centre, along each axis.
-    let reach = (u64::from(x) + u64::from(y)) / 2 + 3;
-    let far = u64::from(u32::MAX);
-    let inside = u64::from(depth.z.0).wrapping_sub(reach) <= far.wrapping_sub(2 * reach);
-    (x | y) < 1 << 27 && inside
+    let reach = slopes / 2 + 3;
+    let nearest = depth.z.0.checked_sub(reach);
+    let furthest = depth.z.0.checked_add(reach);
+    (slopes < 1 << 28) & nearest.is_some() & furthest.is_some()
 }
 
 /// [`Frame::depths`](crate::rop::Frame::depths) of a gentle plane, their upper bit flipped.

@@ -63,6 +63,19 @@ fn one_by_one<S: Simd, L: Lanes<S>>(simd: S, keys: L, words: &[i32], among: u64)
     ranks
 }
 
+/// [`ranks`] of keys of which no two are equal.
+#[inline(always)]
+pub fn ranks_of_distinct<S: Simd, L: Lanes<S>>(simd: S, keys: L, words: &[i32], among: u64) -> L {
+    let mut ranks = L::splat(simd, LAST);
+    let mut left = among;
+    while left != 0 {
+        let j = left.trailing_zeros() as usize % L::LEN;
+        left &= left - 1;
+        ranks = ranks.less_one_where_greater(keys, L::splat(simd, words[j]));
+    }
+    ranks
+}
+
 /// [`ranks`] of any keys whatever.
 #[inline(always)]
 pub fn ranks_of_any<S: Simd, L: Lanes<S>>(simd: S, keys: L, words: &[i32], among: u64) -> L {

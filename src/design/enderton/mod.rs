@@ -1,13 +1,18 @@
 //! Stochastic transparency (Enderton, Sintorn, Shirley, Luebke, TVCG 2011).
 
-use arrayvec::ArrayVec;
+mod fast;
 
+use arrayvec::ArrayVec;
+use fearless_simd::Level;
+
+use crate::design::enderton::fast::FastEnderton;
 use crate::error::Result;
 use crate::param::{Param, Values};
 use crate::random::hash;
+use crate::rop::fast::{Count, FastEngine, Width};
 use crate::rop::stochastic::{self, COMBINATIONS, METHOD, OPAQUE, ROUNDS, STRATA};
 use crate::rop::{
-    Blueprint, Dither, Family, Frame, Info, OpaquePromise, OrderPromise, PixelOrder, Probe,
+    Blueprint, Dither, Engine, Family, Frame, Info, OpaquePromise, OrderPromise, PixelOrder, Probe,
     Promises, Reference, ReferenceKey, Round, Sampler, Site, Stochastic, Threshold, depth_bits,
     random_subset,
 };
@@ -72,16 +77,26 @@ impl Blueprint for Enderton {
     type At<const N: usize> = Stochastic<EndertonSampler<N>, N>;
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
-        let sampler = EndertonSampler {
-            grid: frame.grid,
-            mask: values.choice("mask"),
-            among: values.choice("among"),
-            dither: values.choice("dither"),
-            seed_by: values.choice("seed-by"),
-            table_width: values.integer("table-width") as u32,
-            alpha_levels: (1 << values.integer("alpha-bits")) - 1,
+        stochastic::with_methods(values, frame, EndertonSampler::new(values, frame))
+    }
+
+    fn fast<const N: usize>(
+        values: &Values,
+        frame: &Frame,
+        level: Level,
+    ) -> Result<Option<Box<dyn Engine>>>
+    where
+        Count<N>: Width,
+    {
+        if stochastic::strata_over_rounds(values) {
+            return Ok(None);
+        }
+        let sampler = EndertonSampler::new(values, frame);
+        let Some(sampler) = FastEnderton::new(sampler, depth_bits::of(values)) else {
+            return Ok(None);
         };
-        stochastic::with_methods(values, frame, sampler)
+        let plain = Self::at::<N>(values, frame)?;
+        Ok(Some(Box::new(FastEngine::new(plain, sampler, level))))
     }
 
     fn promises(values: &Values) -> Promises {
@@ -153,6 +168,34 @@ impl Words {
 }
 
 impl<const N: usize> EndertonSampler<N> {
+    fn new(values: &Values, frame: &Frame) -> Self {
+        EndertonSampler {
+            grid: frame.grid,
+            mask: values.choice("mask"),
+            among: values.choice("among"),
+            dither: values.choice("dither"),
+            seed_by: values.choice("seed-by"),
+            table_width: values.integer("table-width") as u32,
+            alpha_levels: (1 << values.integer("alpha-bits")) - 1,
+        }
+    }
+
+    /// The fragment's random words.
+    #[inline]
+    fn words(&self, round: Round, site: Site, fragment: &Fragment) -> Words {
+        Words {
+            seed: round.seed,
+            pixel: u32::from(site.y) << 16 | u32::from(site.x),
+            // The random words belong to what the fragment is part of, so that it is
+            // treated alike wherever it stands in the stream.
+            source: match self.seed_by {
+                SeedBy::Primitive => fragment.primitive,
+                SeedBy::Depth => fragment.depth.z.0,
+                SeedBy::Object => fragment.object,
+            },
+        }
+    }
+
     /// ξ of the fragment, and where it comes from.
     fn xi(&self, round: Round, site: Site, words: Words) -> u32 {
         if self.dither == Dither::White {
@@ -205,17 +248,7 @@ impl<const N: usize> Sampler<N> for EndertonSampler<N> {
         if passed.is_empty() {
             return SampleMask::NONE;
         }
-        let words = Words {
-            seed: round.seed,
-            pixel: u32::from(site.y) << 16 | u32::from(site.x),
-            // The random words belong to what the fragment is part of, so that it is
-            // treated alike wherever it stands in the stream.
-            source: match self.seed_by {
-                SeedBy::Primitive => fragment.primitive,
-                SeedBy::Depth => fragment.depth.z.0,
-                SeedBy::Object => fragment.object,
-            },
-        };
+        let words = self.words(round, site, fragment);
         let from = match self.among {
             // What other rounds leave of a fragment is not known: where masks are
             // stratified over rounds they are chosen among all samples.
