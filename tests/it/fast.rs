@@ -10,7 +10,7 @@ use crate::util::{header, trace, variants};
 
 /// The engines that this machine can run, but for the reference.
 fn engines() -> Vec<Which> {
-    let all = [Which::Avx512, Which::Avx2, Which::Sse2, Which::Neon, Which::Portable];
+    let all = [Which::Avx512, Which::Avx2, Which::Neon, Which::Portable];
     all.into_iter().filter(|which| which.level().is_ok()).collect()
 }
 

@@ -271,7 +271,8 @@ width! {
 }
 
 /// Instruction sets for which kernels are compiled and that this machine has, the
-/// fastest first. The last one is plain Rust and is there everywhere.
+/// fastest first. The last one is plain Rust and is there everywhere. (x86 processors
+/// with SSE2 alone are old by now, and each set costs compile time.)
 pub fn levels() -> Vec<Level> {
     let here = Level::new();
     let mut levels = Vec::new();
@@ -279,7 +280,6 @@ pub fn levels() -> Vec<Level> {
     {
         levels.extend(here.as_avx512().map(Level::Avx512));
         levels.extend(here.as_avx2().map(Level::Avx2));
-        levels.extend(here.as_sse2().map(Level::Sse2));
     }
     #[cfg(target_arch = "aarch64")]
     levels.extend(here.as_neon().map(Level::Neon));
@@ -288,7 +288,7 @@ pub fn levels() -> Vec<Level> {
 }
 
 /// The body of a function: `$body` with `$simd` as the token of `$level`, compiled for
-/// AVX-512, AVX2, SSE2 or NEON, and for any machine.
+/// AVX-512, AVX2 or NEON, and for any machine.
 #[macro_export]
 #[doc(hidden)]
 macro_rules! for_level {
@@ -304,13 +304,6 @@ macro_rules! for_level {
                 );
             }
             if let Some($simd) = level.as_avx2() {
-                return fearless_simd::Simd::vectorize(
-                    $simd,
-                    #[inline(always)]
-                    || $body,
-                );
-            }
-            if let Some($simd) = level.as_sse2() {
                 return fearless_simd::Simd::vectorize(
                     $simd,
                     #[inline(always)]

@@ -38,7 +38,6 @@ crate::options! {
         Fast = "fast": "the design's fast engine, where it has one, with what the machine has",
         Avx512 = "avx512": "the same with AVX-512 (x86)",
         Avx2 = "avx2": "the same with AVX2 (x86)",
-        Sse2 = "sse2": "the same with SSE2 (x86)",
         Neon = "neon": "the same with NEON (ARM)",
         Portable = "portable": "the same without vector instructions of its own",
         Reference = "reference": "the plain text that says what the design is",
@@ -53,12 +52,11 @@ impl Which {
     pub fn level(self) -> Result<Option<Level>> {
         let name = match self {
             // Without vector instructions the plain text is the faster one.
-            Which::Fast => return Ok(Some(Level::new()).filter(|level| !level.is_fallback())),
+            Which::Fast => return Ok(levels().into_iter().find(|level| !level.is_fallback())),
             Which::Portable => return Ok(Some(Level::fallback())),
             Which::Reference => return Ok(None),
             Which::Avx512 => "Avx512",
             Which::Avx2 => "Avx2",
-            Which::Sse2 => "Sse2",
             Which::Neon => "Neon",
         };
         let found = levels().into_iter().find(|level| format!("{level:?}").starts_with(name));
