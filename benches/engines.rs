@@ -119,11 +119,12 @@ fn bench(c: &mut Criterion, name: &str, counts: &[u32], works: &[(&str, Work)]) 
 fn replay(c: &mut Criterion) {
     let folder = tempfile::tempdir().expect("there is room");
     let path = folder.path().join("engine.arrow");
-    let header = captured().header().clone();
+    let captured = captured();
+    let header = captured.header().clone();
     let mut file = BufWriter::new(File::create(&path).expect("it is writable"));
     let mut writer = TraceWriter::new(&mut file, SCENE, header, WriteOptions::default())
         .expect("the header is good");
-    for batch in captured().batches() {
+    for batch in captured.batches() {
         for fragment in batch.expect("it reads").iter() {
             writer.push(&fragment).expect("it writes");
         }

@@ -4,16 +4,15 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use serde::Serialize;
 
-use crate::cli::arguments::RunArguments;
+use crate::cli::arguments::{RunArguments, option};
 use crate::cli::console::{Console, grouped, shown};
 use crate::cli::files::{Json, check, report, write_pictures};
 use crate::design::{Configured, REFERENCE, configure};
 use crate::error::Result;
 use crate::metrics::{Ensemble, EnsembleErrors, PixelClasses, Region};
-use crate::param::{Options, Values};
+use crate::param::Values;
 use crate::picture::{Picture, PictureFile};
 use crate::rop::{EventCounts, Promises, ReplayOptions, Replayed, StateBits, Which};
 use crate::trace::Trace;
@@ -37,7 +36,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     /// Which implementation draws; all give the same bits
-    #[arg(long, default_value = "fast", value_name = "ENGINE", value_parser = engine())]
+    #[arg(long, default_value = "fast", value_name = "ENGINE", value_parser = option::<Which>())]
     engine: Which,
     /// MiB that the exact answer's fragments may take at a time
     #[arg(long, default_value_t = 512, value_name = "MIB", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=1 << 20))]
@@ -45,17 +44,6 @@ pub(super) struct Arguments {
     /// Fragments that are binned at a time, at most
     #[arg(long, default_value_t = 1 << 19, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=1 << 30))]
     window: u64,
-}
-
-/// Engines by their names.
-fn engine() -> impl TypedValueParser<Value = Which> {
-    PossibleValuesParser::new(
-        Which::CHOICES.iter().map(|c| PossibleValue::new(c.name).help(c.help)),
-    )
-    .map(|name| {
-        let named = Which::CHOICES.iter().zip(Which::ALL).find(|(c, _)| c.name == name);
-        *named.expect("the parser knows these names").1
-    })
 }
 
 /// The result of one replay command.

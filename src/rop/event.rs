@@ -18,11 +18,7 @@ pub trait Probe {
     /// The fragment starts a new surface with this number.
     fn surface(&mut self, _number: u32) {}
     /// Samples were sorted; this is their order now.
-    fn sorted(&mut self, order: &[u8]) {
-        self.sorted_many(order.len());
-    }
-    /// So many samples were sorted.
-    fn sorted_many(&mut self, _samples: usize) {}
+    fn sorted(&mut self, _order: &[u8]) {}
     /// All this happened.
     fn many(&mut self, _events: &EventCounts) {}
     /// Sample `sample` got reference value `value` as the `number`-th of its
@@ -134,9 +130,9 @@ impl Probe for EventCounts {
         self.surfaces += 1;
     }
     #[inline]
-    fn sorted_many(&mut self, samples: usize) {
-        if samples > 1 {
-            self.sorts_by_length[samples] += 1;
+    fn sorted(&mut self, order: &[u8]) {
+        if order.len() > 1 {
+            self.sorts_by_length[order.len()] += 1;
         }
     }
     #[inline]

@@ -89,13 +89,16 @@ fn place(n: u32, samples: u32, key: &ReferenceKey) -> (u32, u32) {
     ((index as u32).reverse_bits(), moved)
 }
 
+/// The factors of LK figure 4.
+pub(in crate::rop) const LK2011: [u32; 4] = [0x6c50_b47c, 0xb82f_1e52, 0xc7af_e638, 0x8d22_f6e6];
+
 /// LK figure 4, lines 3 to 6.
 #[inline]
 pub const fn scramble_lk2011(mut x: u32) -> u32 {
-    x ^= x.wrapping_mul(0x6c50_b47c);
-    x ^= x.wrapping_mul(0xb82f_1e52);
-    x ^= x.wrapping_mul(0xc7af_e638);
-    x ^ x.wrapping_mul(0x8d22_f6e6)
+    x ^= x.wrapping_mul(LK2011[0]);
+    x ^= x.wrapping_mul(LK2011[1]);
+    x ^= x.wrapping_mul(LK2011[2]);
+    x ^ x.wrapping_mul(LK2011[3])
 }
 
 /// Vegdahl's second version.

@@ -6,7 +6,8 @@ use fearless_simd::{Level, Simd, dispatch};
 
 use crate::design::exact::lanes::{Composite, Depths, LANES, Offsets, Row, covers, depth_at, row};
 use crate::design::exact::order::{CHUNK, insert_in_order, keep, rank, shorten};
-use crate::rop::{Contents, Engine, Frame, StateBits, TileState, Told};
+use crate::design::exact::tell;
+use crate::rop::{Contents, Engine, Frame, Probe, StateBits, TileState, Told};
 use crate::tile::{TILE_PIXELS, TileGrid, TileId};
 use crate::trace::{DepthPlane, Fragment, SampleMask};
 
@@ -58,10 +59,11 @@ impl Engine for Fast {
         Box::new(Vec::<Layer>::with_capacity(TILE_PIXELS))
     }
 
-    fn draw(&self, pass: u32, state: &mut TileState, fragments: &[Fragment], told: Told<'_>) {
-        if !matches!(told, Told::Nobody) {
-            let mut unused = self.reference.clear(self.frame.grid, TileId(0));
-            self.reference.draw(pass, &mut unused, fragments, told);
+    fn draw(&self, _pass: u32, state: &mut TileState, fragments: &[Fragment], told: Told<'_>) {
+        match told {
+            Told::Nobody => {}
+            Told::Counts(counts) => tell_all(&self.frame, fragments, counts),
+            Told::Record(record) => tell_all(&self.frame, fragments, record),
         }
         let layers = state.downcast_mut::<Vec<Layer>>().expect("the state is the engine's own");
         layers.extend(fragments.iter().map(|f| Layer {
@@ -84,6 +86,13 @@ impl Engine for Fast {
         let layers = state.downcast_ref::<Vec<Layer>>().expect("the state is the engine's own");
         let count = layers.iter().filter(|l| usize::from(l.within) == within).count();
         Contents { samples: Vec::new(), fields: vec![("fragments", count.to_string())] }
+    }
+}
+
+fn tell_all<P: Probe>(frame: &Frame, fragments: &[Fragment], probe: &mut P) {
+    for fragment in fragments {
+        probe.fragment(fragment.coverage);
+        tell(frame, fragment, probe);
     }
 }
 

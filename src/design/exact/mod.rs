@@ -64,6 +64,13 @@ pub struct ExactAt<const N: usize> {
     frame: Frame,
 }
 
+/// What keeping a fragment costs.
+fn tell<P: Probe>(frame: &Frame, fragment: &Fragment, probe: &mut P) {
+    probe.written(fragment.coverage);
+    // Its coverage, its depth plane, its colour and its alpha.
+    probe.state(0, frame.samples() + 3 * 32 + frame.colour_bits + 32);
+}
+
 /// What is kept of a fragment.
 #[derive(Clone, Copy, Debug)]
 pub struct Layer {
@@ -95,9 +102,7 @@ impl<const N: usize> Design for ExactAt<N> {
     ) {
         let Fragment { coverage, depth, colour, alpha, .. } = *fragment;
         layers.push(Layer { coverage, depth, colour, alpha });
-        probe.written(coverage);
-        // Its coverage, its depth plane, its colour and its alpha.
-        probe.state(0, N as u32 + 3 * 32 + self.frame.colour_bits + 32);
+        tell(&self.frame, fragment, probe);
     }
 
     /// `C = Σ α_i c_i Π (1 − α_j)` over the fragments from near to far, at each

@@ -11,10 +11,10 @@ use crate::rop::fast::lanes::{Count, Lanes, Width};
 use crate::rop::fast::state::{FastTile, PlainPixel, boxed};
 use crate::rop::fast::tally::Tally;
 use crate::rop::over_opaque::Transparent;
-use crate::rop::replay::{Engine, TileState, Told};
+use crate::rop::replay::{Engine, TileState, Told, sites};
 use crate::rop::stochastic::{Pass, Round, Sampler, Stochastic};
 use crate::tile::{TILE_PIXELS, TileGrid, TileId};
-use crate::trace::Fragment;
+use crate::trace::{Fragment, SampleMask};
 
 /// A fragment as a [`FastSampler`] meets it.
 #[derive(Clone, Copy)]
@@ -219,7 +219,7 @@ where
         tile: &mut FastTile<F, N>,
         fragment: &Fragment,
         probe: &mut P,
-    ) -> Option<crate::trace::SampleMask> {
+    ) -> Option<SampleMask> {
         if tile.opaque.is_empty() {
             return Some(fragment.coverage);
         }
@@ -280,8 +280,7 @@ where
         if state.sums.is_empty() {
             return;
         }
-        for within in 0..TILE_PIXELS {
-            let site = site(grid, tile, within);
+        for (within, site) in sites(grid, tile).enumerate() {
             self.change(state, within, |pixel| Design::end_pass(&self.plain, pass, site, pixel));
         }
     }
@@ -290,7 +289,7 @@ where
         let state: &FastTile<F, N> = state.downcast_ref().expect("the state is the engine's own");
         let mut result = Box::new([[0.0; 3]; TILE_PIXELS]);
         let single = state.sums.is_empty() && state.opaque.is_empty();
-        for (within, out) in result.iter_mut().enumerate() {
+        for ((within, site), out) in sites(grid, tile).enumerate().zip(result.iter_mut()) {
             *out = if single {
                 let colour = &state.held[within].colour;
                 let colours: [[f32; 3]; N] = std::array::from_fn(|s| {
@@ -299,7 +298,7 @@ where
                 box_filter(&colours)
             } else {
                 let pixel = state.plain(&self.sampler, within);
-                Design::resolve(&self.plain, site(grid, tile, within), &pixel)
+                Design::resolve(&self.plain, site, &pixel)
             };
         }
         result
@@ -309,10 +308,4 @@ where
         let state: &FastTile<F, N> = state.downcast_ref().expect("the state is the engine's own");
         Design::contents(&self.plain, &state.plain(&self.sampler, within))
     }
-}
-
-fn site(grid: TileGrid, tile: TileId, within: usize) -> Site {
-    let (x, y) = grid.pixel(tile, within);
-    // As in the plain engine: pixels beyond the frame are never drawn to.
-    Site { x: x as u16, y: y as u16 }
 }

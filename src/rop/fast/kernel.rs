@@ -45,7 +45,7 @@ pub(super) fn draw_samples<S: Simd, F: FastSampler<N>, P: Probe, const N: usize>
         }
         let mut coverage = fragment.coverage.0;
         if opaque_first {
-            match engine.cull(pass, tile, fragment, probe) {
+            match engine.plain.cull(pass, &mut tile.opaque[within], fragment, probe) {
                 Some(SampleMask(before)) => coverage = before,
                 None => continue,
             }

@@ -270,20 +270,20 @@ width! {
     64: 64 in 4 i32x16;
 }
 
-/// Instruction sets for which kernels are compiled and that this machine has, the
-/// fastest first. The last one is plain Rust and is there everywhere. (x86 processors
+/// Instruction sets for which kernels are compiled and that this machine has, with
+/// their names, the fastest first. The last one is plain Rust and is there everywhere. (x86 processors
 /// with SSE2 alone are old by now, and each set costs compile time.)
-pub fn levels() -> Vec<Level> {
+pub fn levels() -> Vec<(&'static str, Level)> {
     let here = Level::new();
     let mut levels = Vec::new();
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     {
-        levels.extend(here.as_avx512().map(Level::Avx512));
-        levels.extend(here.as_avx2().map(Level::Avx2));
+        levels.extend(here.as_avx512().map(|token| ("avx512", Level::Avx512(token))));
+        levels.extend(here.as_avx2().map(|token| ("avx2", Level::Avx2(token))));
     }
     #[cfg(target_arch = "aarch64")]
-    levels.extend(here.as_neon().map(Level::Neon));
-    levels.push(Level::fallback());
+    levels.extend(here.as_neon().map(|token| ("neon", Level::Neon(token))));
+    levels.push(("portable", Level::fallback()));
     levels
 }
 

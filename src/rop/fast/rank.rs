@@ -183,7 +183,7 @@ mod tests {
                 }
                 for among in among {
                     let case = Case { keys: keys.clone(), among, hits, order };
-                    for level in levels() {
+                    for (_, level) in levels() {
                         let found = by_level::<Count<N>>(level, &case);
                         let Case { keys, .. } = &case;
                         let place = format!("{level:?} {order:?} {keys:?} {among:#x} {hits:#x}");

@@ -7,7 +7,7 @@ use crate::rop::event::Probe;
 use crate::rop::fast::engine::Loaded;
 use crate::rop::fast::lanes::Lanes;
 use crate::rop::fast::tally::Tally;
-use crate::rop::reference_value::{Reference, ReferenceKey};
+use crate::rop::reference_value::{LK2011, Reference, ReferenceKey};
 use crate::rop::tracked::{Hashed, References, SampleOf};
 
 /// The samples of a fragment that are to be numbered.
@@ -49,27 +49,27 @@ pub trait FastReferences<const N: usize>: Copy + Send + Sync + 'static {
 #[derive(Clone, Copy, Debug)]
 pub struct PublishedHash;
 
-impl<const N: usize> FastReferences<N> for PublishedHash {
-    type Plain = Hashed;
-    type Kept = ();
+/// A hash for each sample.
+pub trait HashBy: Copy + Send + Sync + 'static {
+    /// Which one.
+    fn reference(&self) -> Reference;
+}
 
-    fn to_plain((): ()) {}
-    fn of_plain((): &()) {}
-
+impl HashBy for PublishedHash {
     #[inline(always)]
-    fn passing<S: Simd, L: Lanes<S>, P: Probe>(
-        &self,
-        simd: S,
-        loaded: &Loaded<L>,
-        (): &mut (),
-        samples: Numbered<'_>,
-        tally: &mut Tally<'_, P>,
-    ) -> u64 {
-        hashed::<S, L, P, N>(Reference::Lk2011, simd, loaded, samples, tally)
+    fn reference(&self) -> Reference {
+        Reference::Lk2011
     }
 }
 
-impl<const N: usize> FastReferences<N> for Hashed {
+impl HashBy for Hashed {
+    #[inline(always)]
+    fn reference(&self) -> Reference {
+        self.0
+    }
+}
+
+impl<H: HashBy, const N: usize> FastReferences<N> for H {
     type Plain = Hashed;
     type Kept = ();
 
@@ -85,7 +85,7 @@ impl<const N: usize> FastReferences<N> for Hashed {
         samples: Numbered<'_>,
         tally: &mut Tally<'_, P>,
     ) -> u64 {
-        hashed::<S, L, P, N>(self.0, simd, loaded, samples, tally)
+        hashed::<S, L, P, N>(self.reference(), simd, loaded, samples, tally)
     }
 }
 
@@ -135,7 +135,7 @@ pub fn below<S: Simd, L: Lanes<S>>(simd: S, values: L, threshold: u64) -> u64 {
 /// Figure 4, lines 3 to 6.
 #[inline(always)]
 fn lk2011<S: Simd, L: Lanes<S>>(simd: S, mut x: L) -> L {
-    for factor in [0x6c50_b47c_u32, 0xb82f_1e52, 0xc7af_e638, 0x8d22_f6e6] {
+    for factor in LK2011 {
         x = x.xor(x.mul(L::splat(simd, factor as i32)));
     }
     x

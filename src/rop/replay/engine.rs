@@ -111,7 +111,7 @@ fn draw_all<D: Design, P: Probe>(
 }
 
 /// The sites of a tile's pixels, including those beyond the frame's edge.
-fn sites(grid: TileGrid, tile: TileId) -> impl Iterator<Item = Site> {
+pub(in crate::rop) fn sites(grid: TileGrid, tile: TileId) -> impl Iterator<Item = Site> {
     (0..TILE_PIXELS).map(move |within| {
         let (x, y) = grid.pixel(tile, within);
         // Beyond a frame of full size this wraps; such pixels are never drawn to.

@@ -19,10 +19,12 @@ mod window;
 use fearless_simd::Level;
 use rayon::prelude::*;
 
+pub(in crate::rop) use engine::sites;
 pub use engine::{Engine, TileState, Told};
 pub use explain::{Explanation, Step, draw_pixel, explain};
 
 use crate::error::{Error, Result};
+use crate::param::Options;
 use crate::picture::{Picture, TilePixels};
 use crate::rop::design::{Frame, StateBits};
 use crate::rop::event::EventCounts;
@@ -52,18 +54,17 @@ impl Which {
     pub fn level(self) -> Result<Option<Level>> {
         let name = match self {
             // Without vector instructions the plain text is the faster one.
-            Which::Fast => return Ok(levels().into_iter().find(|level| !level.is_fallback())),
-            Which::Portable => return Ok(Some(Level::fallback())),
+            Which::Fast => {
+                let best = levels().into_iter().find(|(_, level)| !level.is_fallback());
+                return Ok(best.map(|(_, level)| level));
+            }
             Which::Reference => return Ok(None),
-            Which::Avx512 => "Avx512",
-            Which::Avx2 => "Avx2",
-            Which::Neon => "Neon",
+            _ => Self::CHOICES[self as usize].name,
         };
-        let found = levels().into_iter().find(|level| format!("{level:?}").starts_with(name));
-        match found {
-            Some(level) => Ok(Some(level)),
+        match levels().into_iter().find(|(level, _)| *level == name) {
+            Some((_, level)) => Ok(Some(level)),
             None => Err(Error::unsupported(
-                format_args!("the engine with {name}"),
+                format_args!("the engine '{name}'"),
                 "this machine does not have these instructions",
                 "choose 'fast', which takes what the machine has",
             )),
