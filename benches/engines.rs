@@ -15,7 +15,7 @@ use screendoor::design::{REFERENCE, configure};
 use screendoor::param::Options;
 use screendoor::rop::{Engine, EventCounts, Frame, ReplayOptions, TileState, Told, Which};
 use screendoor::tile::TileId;
-use screendoor::trace::{Fragment, SampleMask, Trace, TraceWriter, WriteOptions};
+use screendoor::trace::{Block, SampleMask, Trace, TraceWriter, WriteOptions};
 
 const SCENE: &str = "builtin:engine";
 const SIDE: u32 = 512;
@@ -40,7 +40,7 @@ fn binned(trace: &Trace, frame: &Frame) -> Vec<Tile> {
         }
     }
     let tiles = tiles.into_iter().enumerate().filter(|(_, fragments)| !fragments.is_empty());
-    tiles.map(|(tile, fragments)| (TileId(tile as u32), fragments)).collect()
+    tiles.map(|(tile, fragments)| (TileId(tile as u32), Block::all_of(&fragments))).collect()
 }
 
 /// Which parts of an engine's work are timed.
@@ -54,15 +54,17 @@ enum Work {
     Picture,
 }
 
-fn run(engine: &dyn Engine, frame: &Frame, (tile, fragments): &Tile, work: Work) -> TileState {
+fn run(engine: &dyn Engine, frame: &Frame, (tile, blocks): &Tile, work: Work) -> TileState {
     let mut events = EventCounts::default();
     let mut state = engine.clear(frame.grid, *tile);
     for pass in 0..engine.passes() {
-        let told = match work {
-            Work::Count => Told::Counts(&mut events),
-            Work::Draw | Work::Picture => Told::Nobody,
-        };
-        engine.draw(pass, &mut state, fragments, told);
+        for block in blocks {
+            let told = match work {
+                Work::Count => Told::Counts(&mut events),
+                Work::Draw | Work::Picture => Told::Nobody,
+            };
+            engine.draw(pass, &mut state, block, told);
+        }
         engine.end_pass(pass, frame.grid, *tile, &mut state);
     }
     black_box(events);
@@ -70,7 +72,7 @@ fn run(engine: &dyn Engine, frame: &Frame, (tile, fragments): &Tile, work: Work)
 }
 
 /// A tile and its fragments.
-type Tile = (TileId, Vec<Fragment>);
+type Tile = (TileId, Vec<Block>);
 
 /// The engines that this machine can run.
 fn engines() -> impl Iterator<Item = (&'static str, Which)> {
@@ -84,7 +86,7 @@ fn bench(c: &mut Criterion, name: &str, counts: &[u32], works: &[(&str, Work)]) 
     for samples in counts {
         let frame = design.frame(&trace, *samples, 1).expect("it has the samples");
         let tiles = binned(&trace, &frame);
-        let fragments: usize = tiles.iter().map(|(_, fragments)| fragments.len()).sum();
+        let fragments: usize = tiles.iter().flat_map(|(_, blocks)| blocks).map(Block::len).sum();
         let reference = design.build(&frame, Which::Reference).expect("it is built");
         for (label, which) in engines() {
             let engine = design.build(&frame, which).expect("it is built");

@@ -15,7 +15,7 @@ use screendoor::rop::{
     Contents, Engine, Frame, ReplayOptions, Replayed, StateBits, TileState, Told, replay,
 };
 use screendoor::tile::{TILE_PIXELS, TileGrid, TileId};
-use screendoor::trace::{Compression, Fragment, Trace, TraceWriter, WriteOptions};
+use screendoor::trace::{Block, Compression, Trace, TraceWriter, WriteOptions};
 
 /// Layers over every pixel: two million fragments.
 const SCENE: &str = "builtin:layers:count=32,alpha=0.1,coloured=true";
@@ -44,12 +44,13 @@ impl Engine for Counting {
         Box::new([0_u64; 2])
     }
 
-    fn draw(&self, _: u32, state: &mut TileState, fragments: &[Fragment], _: Told<'_>) {
+    fn draw(&self, _: u32, state: &mut TileState, fragments: &Block, _: Told<'_>) {
         let [count, bits] = state.downcast_mut::<[u64; 2]>().expect("it is this engine's own");
-        *count += fragments.len() as u64;
         // Every fragment is looked at, as a design would.
-        *bits =
-            fragments.iter().fold(*bits, |bits, f| bits ^ f.coverage.0 ^ u64::from(f.primitive));
+        for fragment in fragments.iter() {
+            *count += 1;
+            *bits ^= fragment.coverage.0 ^ u64::from(fragment.primitive);
+        }
     }
 
     fn end_pass(&self, _: u32, _: TileGrid, _: TileId, _: &mut TileState) {}

@@ -129,9 +129,19 @@ impl<T> TileMap<T> {
         self.tiles
     }
 
-    /// The same tiles with other values.
-    pub fn map<U>(self, change: impl FnOnce(Vec<(TileId, T)>) -> Vec<(TileId, U)>) -> TileMap<U> {
-        TileMap { grid: self.grid, slots: self.slots, tiles: change(self.tiles) }
+    /// The same tiles, or some of them, with other values.
+    pub fn filter_map<U>(
+        mut self,
+        change: impl FnOnce(Vec<(TileId, T)>) -> Vec<(TileId, U)>,
+    ) -> TileMap<U> {
+        for (tile, _) in &self.tiles {
+            self.slots[tile.0 as usize] = 0;
+        }
+        let tiles = change(self.tiles);
+        for (i, (tile, _)) in tiles.iter().enumerate() {
+            self.slots[tile.0 as usize] = i as u32 + 1;
+        }
+        TileMap { grid: self.grid, slots: self.slots, tiles }
     }
 }
 

@@ -11,8 +11,8 @@ use fearless_simd::{Level, Simd};
 use crate::error::Result;
 use crate::param::{Param, Values};
 use crate::rop::fast::{
-    Count, FastEngine, FastReferences, FastTracked, Given, Lanes, Loaded, Numbered, Published,
-    Tally, Width, below, is_published,
+    Base, Count, FastEngine, FastReferences, FastTracked, Given, Lanes, Limit, Loaded, Numbered,
+    Published, Tally, Width, below, is_published,
 };
 use crate::rop::stochastic::{self, COMBINATIONS, METHOD, OPAQUE, ROUNDS, STRATA};
 use crate::rop::tracked::{
@@ -21,7 +21,7 @@ use crate::rop::tracked::{
 };
 use crate::rop::{
     Blueprint, Dither, Engine, Family, Frame, Info, OpaquePromise, OrderPromise, Probe, Promises,
-    Reference, Stochastic, Threshold, depth_bits,
+    Reference, Round, Stochastic, depth_bits,
 };
 
 crate::options! {
@@ -194,7 +194,7 @@ impl<const N: usize> FastReferences<N> for Evenly {
         samples: Numbered<'_>,
         tally: &mut Tally<'_, P>,
     ) -> u64 {
-        let Numbered { of, first, count } = samples;
+        let Numbered { of, limit, first, count, .. } = samples;
         if count == 0 {
             return 0;
         }
@@ -215,22 +215,17 @@ impl<const N: usize> FastReferences<N> for Evenly {
         };
         let end = start.wrapping_add(threshold.wrapping_mul(count));
         *kept = Some(if self.phase == Phase::Sum { end } else { xi });
-        evenly(simd, loaded, start, of.opacity)
+        evenly(simd, loaded, start, limit)
     }
 }
 
 /// Which of a run of samples pass whose phases follow `start` in even steps.
 #[inline(always)]
-fn evenly<S: Simd, L: Lanes<S>>(
-    simd: S,
-    loaded: &Loaded<L>,
-    start: u32,
-    opacity: Threshold,
-) -> u64 {
-    let threshold = opacity.value() as u32;
+fn evenly<S: Simd, L: Lanes<S>>(simd: S, loaded: &Loaded<L>, start: u32, limit: Limit) -> u64 {
+    let threshold = limit.threshold().value() as u32;
     let steps = loaded.lanes.mul(L::splat(simd, threshold as i32));
     let first = L::splat(simd, start.wrapping_add(threshold) as i32);
-    below(simd, steps.add(first), opacity.value())
+    below(simd, steps.add(first), limit)
 }
 
 /// [`Evenly`] with the parameters that it has by default, known when the kernel is
@@ -250,6 +245,11 @@ impl<const N: usize> FastReferences<N> for Summed {
         (kept.unwrap_or_default(), kept.is_some())
     }
 
+    /// One value a pixel, whatever the round.
+    fn base(_: &Round, pixel: u32, seed: u32) -> Base {
+        Base::of(0, 1, pixel, seed)
+    }
+
     #[inline(always)]
     fn passing<S: Simd, L: Lanes<S>, P: Probe>(
         &self,
@@ -259,23 +259,35 @@ impl<const N: usize> FastReferences<N> for Summed {
         samples: Numbered<'_>,
         tally: &mut Tally<'_, P>,
     ) -> u64 {
-        let Numbered { of, count, .. } = samples;
+        let Numbered { of, limit, base, before, starts, count, .. } = samples;
         let (phase, begun) = *kept;
         tally.hashed(u32::from(!begun && count > 0));
-        let threshold = of.opacity.value() as u32;
+        let threshold = limit.threshold().value() as u32;
         let earlier = threshold.wrapping_mul(of.round.index * N as u32);
-        let xi = Dither::Sequence.value(of.site, of.key, Reference::Lk2011);
-        let start = if begun { phase } else { xi.wrapping_add(earlier) };
+        // Of the next surface in any case: then it need not be waited for.
+        let next = base.first_lk2011(before.wrapping_add(1)).wrapping_add(earlier);
+        let start = match (starts, begun) {
+            (true, _) => next,
+            (false, true) => phase,
+            (false, false) => first(base, before).wrapping_add(earlier),
+        };
         *kept = (start.wrapping_add(threshold.wrapping_mul(count)), begun || count > 0);
-        evenly(simd, loaded, start, of.opacity)
+        evenly(simd, loaded, start, limit)
     }
+}
+
+/// The random number of a pixel's very first surface.
+#[cold]
+#[inline(never)]
+fn first(base: Base, surface: u32) -> u32 {
+    base.first_lk2011(surface)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::random::Stream;
-    use crate::rop::{PixelIndex, ReferenceKey, Round, Site};
+    use crate::rop::{PixelIndex, ReferenceKey, Site, Threshold};
 
     /// Which of a surface's samples pass, their alphas given fragment by fragment.
     fn passes(phase: Phase, seed: u32, fragments: &[(f32, usize)]) -> Vec<bool> {

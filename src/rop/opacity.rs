@@ -12,17 +12,17 @@ pub struct Threshold(u64);
 
 impl Threshold {
     /// The threshold of an alpha in [0, 1].
-    #[inline]
-    pub fn of(alpha: f32) -> Self {
-        // Of an alpha from 2^-9 up, the bits themselves: all that its mantissa holds are
-        // multiples of 2^-32.
-        let (exponent, mantissa) = (alpha.to_bits() >> 23, alpha.to_bits() & 0x7f_ffff);
-        if let 118..=127 = exponent {
-            return Threshold(u64::from(mantissa | 1 << 23) << (exponent - 118));
-        }
-        // Exact: a single-precision number times a power of two, in double precision.
-        let scaled = f64::from(alpha) * 4_294_967_296.0;
-        Threshold(scaled.ceil() as u64)
+    #[inline(always)]
+    pub const fn of(alpha: f32) -> Self {
+        // α = m·2^(e−150): exactly m·2^(e−118) multiples of 2^-32 from e = 118 up, rounded
+        // up below. Of denormal numbers m is too large, but what is not 0 becomes 1.
+        let bits = alpha.to_bits();
+        let exponent = bits >> 23 & 0xff;
+        let mantissa = bits & 0x7f_ffff | ((exponent > 0) as u32) << 23;
+        let (up, down) = (exponent.saturating_sub(118), 118_u32.saturating_sub(exponent));
+        let down = if down < 31 { down } else { 31 };
+        let whole = (mantissa + ((1 << down) - 1)) >> down;
+        Threshold((whole as u64) << up)
     }
 
     /// Whether reference value `x` lets a sample pass.
@@ -36,6 +36,12 @@ impl Threshold {
     #[inline]
     pub const fn of_many(self, count: u32, x: u32) -> u32 {
         ((self.0 * count as u64 + x as u64) >> 32) as u32
+    }
+
+    /// The threshold that is `T`, from 0 to 2^32.
+    #[inline]
+    pub(in crate::rop) const fn of_value(value: u64) -> Self {
+        Threshold(value)
     }
 
     /// `T`, from 0 to 2^32.

@@ -125,6 +125,11 @@ impl Batch {
         (self.x.get(i), self.y.get(i))
     }
 
+    /// The pixels' columns and rows.
+    pub(crate) fn places(&self) -> [&Column<u16>; 2] {
+        [&self.x, &self.y]
+    }
+
     /// The samples that fragment `i` covers.
     ///
     /// # Panics

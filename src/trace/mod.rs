@@ -10,9 +10,9 @@
 compile_error!("traces are little-endian and are read without conversion");
 
 mod batch;
+mod block;
 mod column;
 mod content;
-mod decode;
 mod decompress;
 mod fragment;
 mod header;
@@ -23,8 +23,9 @@ mod stats;
 mod write;
 
 pub use batch::{Batch, MAX_BATCH_ROWS};
+pub use block::{BLOCK, Block};
+pub(crate) use block::{STRETCH, Stretch};
 pub use column::{ChannelColumn, Column, ColumnId, CoverageColumn, Native, Scalar, ValueType};
-pub(crate) use decode::{BLOCK, Decoder, Footprints};
 pub use fragment::{DepthPlane, Fragment, MAX_SAMPLES, SampleMask, Unorm32};
 pub use header::{ColourFormat, FORMAT_VERSION, Header, MAX_SIDE, SamplePattern};
 pub use read::Trace;

@@ -4,7 +4,7 @@ use screendoor::design::{Configured, DESIGNS};
 use screendoor::random::Stream;
 use screendoor::rop::{EventCounts, Frame, Site, Told, Which};
 use screendoor::tile::{TileGrid, TileId};
-use screendoor::trace::{DepthPlane, Fragment, Header, SampleMask, Unorm32};
+use screendoor::trace::{Block, DepthPlane, Fragment, Header, SampleMask, Unorm32};
 
 use crate::util::{header, trace, variants};
 
@@ -81,9 +81,9 @@ fn run(
     let mut uncounted = engine.clear(grid, tile);
     for pass in 0..engine.passes() {
         // In two parts, as windows cut them.
-        for part in fragments.chunks(fragments.len() / 2 + 1) {
-            engine.draw(pass, &mut counted, part, Told::Counts(&mut counts));
-            engine.draw(pass, &mut uncounted, part, Told::Nobody);
+        for part in fragments.chunks(fragments.len() / 2 + 1).flat_map(Block::all_of) {
+            engine.draw(pass, &mut counted, &part, Told::Counts(&mut counts));
+            engine.draw(pass, &mut uncounted, &part, Told::Nobody);
         }
         engine.end_pass(pass, grid, tile, &mut counted);
         engine.end_pass(pass, grid, tile, &mut uncounted);

@@ -7,7 +7,7 @@ use crate::random::{GOLDEN, hash};
 use crate::rop::fast::{
     FastSampler, Lanes, Loaded, Offered, Tally, below, picked, ranks_of_distinct,
 };
-use crate::rop::{Probe, Site, Threshold};
+use crate::rop::{Probe, Round};
 use crate::tile::{TILE_PIXELS, TileGrid, TileId};
 use crate::trace::MAX_SAMPLES;
 
@@ -41,7 +41,8 @@ impl<const N: usize> FastSampler<N> for FastEnderton<N> {
     }
 
     fn to_plain(&self, (): ()) {}
-    fn of_plain(&self, (): &()) {}
+    fn of_plain(&self, (): &(), (): &mut ()) {}
+    fn enter(&self, _: &Round, _: &mut [(); TILE_PIXELS]) {}
 
     #[inline(always)]
     fn depth_bits(&self) -> u32 {
@@ -62,25 +63,24 @@ impl<const N: usize> FastSampler<N> for FastEnderton<N> {
         offered: Offered<'_, L>,
         tally: &mut Tally<'_, P>,
     ) -> L::Mask {
-        let Offered { round, passed, coverage, fragment, .. } = offered;
+        let Offered { round, passed, coverage, fragment, limit, .. } = offered;
         if passed == 0 {
             return L::mask(simd, 0);
         }
-        let site = Site { x: fragment.x, y: fragment.y };
-        let words = self.plain.words(*round, site, fragment);
+        let site = fragment.site();
+        let words = self.plain.words(*round, site, &fragment.whole());
         let from = match self.plain.among {
             Among::Passed => passed,
             Among::Covered => coverage,
         };
-        let opacity = Threshold::of(fragment.alpha);
         let count = from.count_ones();
         let of_samples = words_of_samples(simd, loaded, words);
         if self.naive {
             tally.hashed(count);
-            return L::mask(simd, below(simd, of_samples, opacity.value()) & from & passed);
+            return L::mask(simd, below(simd, of_samples, limit) & from & passed);
         }
         tally.hashed(1 + count);
-        let chosen = opacity.of_many(count, self.plain.xi(*round, site, words));
+        let chosen = limit.threshold().of_many(count, self.plain.xi(*round, site, words));
         let hits = u64::MAX.checked_shr(64 - chosen).unwrap_or(0);
         let keys = of_samples.xor(L::splat(simd, i32::MIN));
         let mut list = [0; MAX_SAMPLES as usize];

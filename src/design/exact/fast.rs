@@ -9,7 +9,7 @@ use crate::design::exact::order::{CHUNK, insert_in_order, keep, rank, shorten};
 use crate::design::exact::tell;
 use crate::rop::{Contents, Engine, Frame, Probe, StateBits, TileState, Told};
 use crate::tile::{TILE_PIXELS, TileGrid, TileId};
-use crate::trace::{DepthPlane, Fragment, SampleMask};
+use crate::trace::{Block, DepthPlane, SampleMask};
 
 /// The engine. It is compiled once for all sample counts: it works in blocks of
 /// eight samples.
@@ -59,7 +59,7 @@ impl Engine for Fast {
         Box::new(Vec::<Layer>::with_capacity(TILE_PIXELS))
     }
 
-    fn draw(&self, _pass: u32, state: &mut TileState, fragments: &[Fragment], told: Told<'_>) {
+    fn draw(&self, _pass: u32, state: &mut TileState, fragments: &Block, told: Told<'_>) {
         match told {
             Told::Nobody => {}
             Told::Counts(counts) => tell_all(&self.frame, fragments, counts),
@@ -89,10 +89,10 @@ impl Engine for Fast {
     }
 }
 
-fn tell_all<P: Probe>(frame: &Frame, fragments: &[Fragment], probe: &mut P) {
-    for fragment in fragments {
+fn tell_all<P: Probe>(frame: &Frame, fragments: &Block, probe: &mut P) {
+    for fragment in fragments.iter() {
         probe.fragment(fragment.coverage);
-        tell(frame, fragment, probe);
+        tell(frame, &fragment, probe);
     }
 }
 
@@ -114,7 +114,7 @@ fn resolve<S: Simd>(simd: S, frame: &Frame, layers: &[Layer]) -> Box<Pixels> {
     let mut bare_sum = [0.0; 3];
     for (block, positions) in frame.positions.chunks(LANES).enumerate() {
         let offsets = Offsets::new(positions);
-        let block = Block { layers, first: block * LANES, positions, offsets, background };
+        let block = Octet { layers, first: block * LANES, positions, offsets, background };
         let ends = block.keys_by_pixel(&mut keys);
         let (empty, _) = Composite::new(simd, &block.offsets).over(background);
         add_samples(&mut bare_sum, &empty, positions.len());
@@ -157,7 +157,7 @@ struct Scratch {
 }
 
 /// Up to eight samples of a tile's pixels.
-struct Block<'a> {
+struct Octet<'a> {
     layers: &'a [Layer],
     /// The number of its first sample.
     first: usize,
@@ -166,7 +166,7 @@ struct Block<'a> {
     background: [f64; 3],
 }
 
-impl Block<'_> {
+impl Octet<'_> {
     #[inline(always)]
     fn covered(&self, layer: &Layer) -> u8 {
         (layer.coverage.0 >> self.first) as u8

@@ -7,7 +7,7 @@ use crate::design::{REFERENCE, configure};
 use crate::random::Stream;
 use crate::rop::{Engine, EventCounts, Frame, TileState, Told, Which};
 use crate::tile::{TILE_PIXELS, TileGrid, TileId};
-use crate::trace::{DepthPlane, Fragment, SampleMask, Unorm32};
+use crate::trace::{Block, DepthPlane, Fragment, SampleMask, Unorm32};
 
 const SAMPLES: [u32; 7] = [1, 2, 4, 8, 16, 32, 64];
 const TILE: TileId = TileId(0);
@@ -126,8 +126,8 @@ fn drawn(engine: &dyn Engine, frame: &Frame, fragments: &[Fragment]) -> (TileSta
     let mut state = engine.clear(frame.grid, TILE);
     let mut counts = EventCounts::default();
     let (first, rest) = fragments.split_at(fragments.len() / 3);
-    for part in std::iter::once(first).chain(rest.chunks(64)) {
-        engine.draw(0, &mut state, part, Told::Counts(&mut counts));
+    for part in std::iter::once(first).chain(rest.chunks(64)).flat_map(Block::all_of) {
+        engine.draw(0, &mut state, &part, Told::Counts(&mut counts));
     }
     engine.end_pass(0, frame.grid, TILE, &mut state);
     (state, counts)

@@ -8,13 +8,47 @@ use crate::rop::design::{Contents, Design, Frame, Site, StateBits};
 use crate::rop::event::{NoProbe, Probe};
 use crate::rop::fast::kernel;
 use crate::rop::fast::lanes::{Count, Lanes, Width};
+use crate::rop::fast::references::Limit;
 use crate::rop::fast::state::{FastTile, PlainPixel, boxed};
 use crate::rop::fast::tally::Tally;
 use crate::rop::over_opaque::Transparent;
 use crate::rop::replay::{Engine, TileState, Told, sites};
 use crate::rop::stochastic::{Pass, Round, Sampler, Stochastic};
 use crate::tile::{TILE_PIXELS, TileGrid, TileId};
-use crate::trace::{Fragment, SampleMask};
+use crate::trace::{Block, Fragment, SampleMask};
+
+/// A fragment in its block.
+#[derive(Clone, Copy, Debug)]
+pub struct Row<'a> {
+    pub(super) block: &'a Block,
+    pub(super) i: usize,
+}
+
+impl Row<'_> {
+    /// Its pixel.
+    #[inline(always)]
+    pub fn site(&self) -> Site {
+        Site { x: self.block.x[self.i], y: self.block.y[self.i] }
+    }
+
+    /// Its primitive.
+    #[inline(always)]
+    pub fn primitive(&self) -> u32 {
+        self.block.primitive[self.i]
+    }
+
+    /// Its object.
+    #[inline(always)]
+    pub fn object(&self) -> u32 {
+        self.block.object[self.i]
+    }
+
+    /// All of it; its coverage may hold samples behind opaque ones.
+    #[inline(always)]
+    pub fn whole(&self) -> Fragment {
+        self.block.fragment(self.i)
+    }
+}
 
 /// A fragment as a [`FastSampler`] meets it.
 #[derive(Clone, Copy)]
@@ -29,8 +63,10 @@ pub struct Offered<'a, L> {
     pub passed: u64,
     /// The samples that were put to it.
     pub coverage: u64,
-    /// The fragment; its own coverage may hold samples behind opaque ones.
-    pub fragment: &'a Fragment,
+    /// The fragment's threshold.
+    pub limit: Limit,
+    /// The fragment.
+    pub fragment: Row<'a>,
 }
 
 /// [`Sampler`] in lanes.
@@ -44,8 +80,10 @@ pub trait FastSampler<const N: usize>: Send + Sync + 'static {
     fn clear(&self, grid: TileGrid, tile: TileId) -> Vec<Self::State>;
     /// A state as the plain text has it.
     fn to_plain(&self, state: Self::State) -> <Self::Plain as Sampler<N>>::State;
-    /// The other way.
-    fn of_plain(&self, plain: &<Self::Plain as Sampler<N>>::State) -> Self::State;
+    /// The other way; `state` is what the pixel's was.
+    fn of_plain(&self, plain: &<Self::Plain as Sampler<N>>::State, state: &mut Self::State);
+    /// Starts a round: works out what a pixel's fragments have in common in it.
+    fn enter(&self, round: &Round, states: &mut [Self::State; TILE_PIXELS]);
     /// Bits of a stored depth.
     fn depth_bits(&self) -> u32;
     /// Whether a fragment does nothing unless a sample of it passes the depth test.
@@ -156,29 +194,34 @@ where
         &self,
         pass: u32,
         tile: &mut FastTile<F, N>,
-        fragments: &[Fragment],
+        block: &Block,
         probe: &mut P,
     ) {
         let methods = &self.plain.inner;
         let Some(inner) = pass.checked_sub(self.plain.own_passes()) else {
-            for fragment in fragments {
+            for fragment in block.iter() {
                 let within = TileGrid::within(fragment.x, fragment.y);
                 probe.fragment(fragment.coverage);
-                self.plain.cull(pass, &mut tile.opaque[within], fragment, probe);
+                self.plain.cull(pass, &mut tile.opaque[within], &fragment, probe);
             }
             return;
         };
         match methods.pass(inner) {
             Pass::Sample(round) => {
-                self.draw_samples(pass, methods.round(round), tile, fragments, probe);
+                let round = methods.round(round);
+                if tile.entered != Some(round) {
+                    tile.entered = Some(round);
+                    self.sampler.enter(&round, &mut tile.states);
+                }
+                self.draw_samples(pass, round, tile, block, probe);
             }
-            Pass::Accumulate(_) => self.accumulate(pass, tile, fragments, probe),
+            Pass::Accumulate(_) => self.accumulate(pass, tile, block, probe),
             Pass::TotalAlpha => {
-                for fragment in fragments {
+                for fragment in block.iter() {
                     let within = TileGrid::within(fragment.x, fragment.y);
                     probe.fragment(fragment.coverage);
-                    let Some(coverage) = self.cull(pass, tile, fragment, probe) else { continue };
-                    let fragment = Fragment { coverage, ..*fragment };
+                    let Some(coverage) = self.cull(pass, tile, &fragment, probe) else { continue };
+                    let fragment = Fragment { coverage, ..fragment };
                     let sums = tile.sums[within].as_mut().expect("it has sums");
                     methods.draw_alpha(sums, &fragment, probe);
                 }
@@ -191,11 +234,11 @@ where
         pass: u32,
         round: Round,
         tile: &mut FastTile<F, N>,
-        fragments: &[Fragment],
+        block: &Block,
         probe: &mut P,
     ) {
         crate::for_level!(self.level, simd => {
-            kernel::draw_samples(simd, self, pass, round, tile, fragments, probe)
+            kernel::draw_samples(simd, self, pass, round, tile, block, probe)
         })
     }
 
@@ -203,11 +246,11 @@ where
         &self,
         pass: u32,
         tile: &mut FastTile<F, N>,
-        fragments: &[Fragment],
+        block: &Block,
         probe: &mut P,
     ) {
         crate::for_level!(self.level, simd => {
-            kernel::accumulate(simd, self, pass, tile, fragments, probe)
+            kernel::accumulate(simd, self, pass, tile, block, probe)
         })
     }
 
@@ -261,15 +304,15 @@ where
         Box::new(FastTile::<F, N>::cleared(frame, boxed(states), sums.as_deref(), opaque))
     }
 
-    fn draw(&self, pass: u32, state: &mut TileState, fragments: &[Fragment], told: Told<'_>) {
+    fn draw(&self, pass: u32, state: &mut TileState, fragments: &Block, told: Told<'_>) {
         let tile = own::<F, N>(state);
         match told {
             Told::Nobody => self.draw_all(pass, tile, fragments, &mut NoProbe),
             Told::Counts(counts) => self.draw_all(pass, tile, fragments, counts),
             Told::Record(record) => {
-                for fragment in fragments {
+                for fragment in fragments.iter() {
                     record.fragment(fragment.coverage);
-                    self.draw_plainly(pass, tile, fragment, record);
+                    self.draw_plainly(pass, tile, &fragment, record);
                 }
             }
         }

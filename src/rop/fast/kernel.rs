@@ -2,17 +2,94 @@
 
 use fearless_simd::Simd;
 
+use crate::rop::design::Frame;
 use crate::rop::event::Probe;
-use crate::rop::fast::engine::{FastEngine, FastSampler, Loaded, Offered};
+use crate::rop::fast::engine::{FastEngine, FastSampler, Loaded, Offered, Row};
 use crate::rop::fast::lanes::{Count, Lanes, Width};
+use crate::rop::fast::references::Limit;
 use crate::rop::fast::state::{FastTile, SIGN};
 use crate::rop::fast::tally::Tally;
+use crate::rop::opacity::Threshold;
 use crate::rop::stochastic::{Round, Sampler};
 use crate::tile::{TILE_PIXELS, TileGrid};
-use crate::trace::{DepthPlane, Fragment, MAX_SAMPLES, SampleMask};
+use crate::trace::{BLOCK, Block, Fragment, MAX_SAMPLES, SampleMask};
 
 /// The lanes of a pixel of `N` samples.
 type LanesOf<S, const N: usize> = <Count<N> as Width>::Lanes<S>;
+
+/// What follows from a fragment alone, for a whole block: without a branch, so that the
+/// compiler makes vectors of it.
+struct Prepared {
+    /// The rows that are fragments.
+    rows: [u8; BLOCK],
+    count: usize,
+    /// Each fragment's place in the tile, and as much beyond all places where its plane is
+    /// not gentle.
+    within: [u16; BLOCK],
+    /// Depths at the pixels' centres, their upper bit flipped.
+    z: [i32; BLOCK],
+    limit: [i32; BLOCK],
+    all: [u64; BLOCK],
+}
+
+impl Prepared {
+    #[inline(always)]
+    fn of(block: &Block) -> Self {
+        let mut prepared = Prepared {
+            rows: [0; BLOCK],
+            count: 0,
+            within: [0; BLOCK],
+            z: [0; BLOCK],
+            limit: [0; BLOCK],
+            all: [0; BLOCK],
+        };
+        // Whole vectors: what lies beyond the block's length is not looked at.
+        for i in 0..block.len().next_multiple_of(16).min(BLOCK) {
+            let gentle = is_gentle(block.z[i], block.dzdx[i], block.dzdy[i]);
+            let beyond = u16::from(!gentle) * TILE_PIXELS as u16;
+            prepared.within[i] = TileGrid::within(block.x[i], block.y[i]) as u16 | beyond;
+            prepared.z[i] = (block.z[i] ^ SIGN) as i32;
+            let Limit { below, all } = Limit::of(Threshold::of(block.alpha[i]));
+            (prepared.limit[i], prepared.all[i]) = (below, all);
+        }
+        let mut count = 0;
+        for (i, coverage) in block.coverage[..block.len().min(BLOCK)].iter().enumerate() {
+            prepared.rows[count % BLOCK] = i as u8;
+            count += usize::from(*coverage != 0);
+        }
+        prepared.count = count;
+        prepared
+    }
+
+    #[inline(always)]
+    fn drawn(&self) -> &[u8] {
+        &self.rows[..self.count]
+    }
+
+    /// [`Frame::depths`] of a row, their upper bit flipped; `None` where they come near the
+    /// near end of the range, which [`super::ranks`] asks for.
+    #[inline(always)]
+    fn depths<S: Simd, F: FastSampler<N>, const N: usize>(
+        &self,
+        simd: S,
+        engine: &FastEngine<F, N>,
+        loaded: &Loaded<LanesOf<S, N>>,
+        block: &Block,
+        i: usize,
+    ) -> Option<LanesOf<S, N>>
+    where
+        Count<N>: Width,
+    {
+        let bits = engine.sampler.depth_bits();
+        if usize::from(self.within[i]) < TILE_PIXELS {
+            let plane = [self.z[i], block.dzdx[i], block.dzdy[i]];
+            return Some(depths(simd, loaded, plane, bits));
+        }
+        let frame = &engine.plain.inner.frame;
+        let row = depths_of_any::<N>(frame, &block.fragment(i), bits)?;
+        Some(LanesOf::<S, N>::load(simd, row.as_ref()))
+    }
+}
 
 /// Draws the fragments of one round: [`Methods::draw`](crate::rop::Transparent::draw)
 /// for a pass of samples.
@@ -23,34 +100,36 @@ pub(super) fn draw_samples<S: Simd, F: FastSampler<N>, P: Probe, const N: usize>
     pass: u32,
     round: Round,
     tile: &mut FastTile<F, N>,
-    fragments: &[Fragment],
+    block: &Block,
     probe: &mut P,
 ) where
     Count<N>: Width,
 {
     let loaded = engine.constants.load(simd);
+    let prepared = Prepared::of(block);
     let (sampler, methods) = (&engine.sampler, &engine.plain.inner);
     let depth_bits = sampler.depth_bits();
     let mut lengths = [0; MAX_SAMPLES as usize + 1];
     let mut tally = Tally::<P>::new(&mut lengths);
     let (several, opaque_first) = (!tile.sums.is_empty(), !tile.opaque.is_empty());
-    for fragment in fragments {
-        let within = TileGrid::within(fragment.x, fragment.y) % TILE_PIXELS;
-        if P::LISTENS {
-            tally.fragments += 1;
-        }
-        if !is_gentle(&fragment.depth) {
-            engine.draw_plainly(pass, tile, fragment, probe);
+    if P::LISTENS {
+        tally.fragments += prepared.drawn().len() as u64;
+    }
+    for row in prepared.drawn() {
+        let i = usize::from(*row);
+        let within = usize::from(prepared.within[i]) % TILE_PIXELS;
+        let Some(z) = prepared.depths(simd, engine, &loaded, block, i) else {
+            engine.draw_plainly(pass, tile, &block.fragment(i), probe);
             continue;
-        }
-        let mut coverage = fragment.coverage.0;
+        };
+        let mut coverage = block.coverage[i];
         if opaque_first {
-            match engine.plain.cull(pass, &mut tile.opaque[within], fragment, probe) {
+            let opaque = &mut tile.opaque[within];
+            match engine.plain.cull(pass, opaque, &block.fragment(i), probe) {
                 Some(SampleMask(before)) => coverage = before,
                 None => continue,
             }
         }
-        let z = depths::<S, LanesOf<S, N>>(simd, &loaded, &fragment.depth, depth_bits);
         let held = &mut tile.held[within];
         let stored = LanesOf::<S, N>::load(simd, held.depth.as_ref());
         let behind = LanesOf::<S, N>::bits(z.greater(stored));
@@ -69,14 +148,15 @@ pub(super) fn draw_samples<S: Simd, F: FastSampler<N>, P: Probe, const N: usize>
             words: held.depth.as_ref(),
             passed,
             coverage,
-            fragment,
+            limit: Limit { below: prepared.limit[i], all: prepared.all[i] },
+            fragment: Row { block, i },
         };
         let state = &mut tile.states[within];
         let written = sampler.choose(simd, &loaded, state, offered, &mut tally);
         let depth = LanesOf::<S, N>::select(written, z, stored);
         depth.store(held.depth.as_mut());
-        for (row, channel) in held.colour.iter_mut().zip(fragment.colour) {
-            let new = LanesOf::<S, N>::splat(simd, channel.to_bits() as i32);
+        for (row, channel) in held.colour.iter_mut().zip(&block.colour) {
+            let new = LanesOf::<S, N>::splat(simd, channel[i].to_bits() as i32);
             let old = LanesOf::<S, N>::load(simd, row.as_ref());
             LanesOf::<S, N>::select(written, new, old).store(row.as_mut());
         }
@@ -101,52 +181,72 @@ pub(super) fn accumulate<S: Simd, F: FastSampler<N>, P: Probe, const N: usize>(
     engine: &FastEngine<F, N>,
     pass: u32,
     tile: &mut FastTile<F, N>,
-    fragments: &[Fragment],
+    block: &Block,
     probe: &mut P,
 ) where
     Count<N>: Width,
 {
     let loaded = engine.constants.load(simd);
-    for fragment in fragments {
-        let within = TileGrid::within(fragment.x, fragment.y);
+    let prepared = Prepared::of(block);
+    for row in prepared.drawn() {
+        let i = usize::from(*row);
+        let within = usize::from(prepared.within[i]) % TILE_PIXELS;
+        let fragment = block.fragment(i);
         probe.fragment(fragment.coverage);
-        if !is_gentle(&fragment.depth) {
-            engine.draw_plainly(pass, tile, fragment, probe);
+        let Some(z) = prepared.depths(simd, engine, &loaded, block, i) else {
+            engine.draw_plainly(pass, tile, &fragment, probe);
             continue;
-        }
-        let Some(coverage) = engine.cull(pass, tile, fragment, probe) else { continue };
-        let bits = engine.sampler.depth_bits();
-        let z = depths::<S, LanesOf<S, N>>(simd, &loaded, &fragment.depth, bits);
+        };
+        let Some(coverage) = engine.cull(pass, tile, &fragment, probe) else { continue };
         let stored = LanesOf::<S, N>::load(simd, tile.held[within].depth.as_ref());
         let behind = LanesOf::<S, N>::bits(z.greater(stored));
         let visible = SampleMask(coverage.0 & !behind);
         let sums = tile.sums[within].as_mut().expect("it has sums");
-        let fragment = Fragment { coverage, ..*fragment };
+        let fragment = Fragment { coverage, ..fragment };
         engine.plain.inner.accumulate(sums, &fragment, visible, probe);
     }
 }
 
 /// Whether a plane's depths at the samples follow from sums and products of 32 bits:
-/// nowhere beyond the depth range nor at its near end (which [`super::ranks`] asks
-/// for), and not very steep. Nearly all are.
+/// nowhere beyond the depth range nor at its near end, and not very steep. Nearly all are.
 #[inline(always)]
-fn is_gentle(depth: &DepthPlane) -> bool {
-    // Twice 2^31, where both are the steepest there is, would wrap to 0.
-    let slopes = depth.dzdx.unsigned_abs().saturating_add(depth.dzdy.unsigned_abs());
+fn is_gentle(z: u32, dzdx: i32, dzdy: i32) -> bool {
+    // Each apart: their sum might wrap.
+    const STEEP: u32 = 1 << 27;
+    let (across, down) = (dzdx.unsigned_abs(), dzdy.unsigned_abs());
     // Samples lie at most half a pixel from the centre, along each axis.
-    let reach = slopes / 2 + 3;
-    let nearest = depth.z.0.checked_sub(reach);
-    let furthest = depth.z.0.checked_add(reach);
-    (slopes < 1 << 28) & nearest.is_some() & furthest.is_some()
+    let reach = across.wrapping_add(down) / 2 + 3;
+    (across < STEEP) & (down < STEEP) & (z >= reach) & (z <= u32::MAX - reach)
 }
 
-/// [`Frame::depths`](crate::rop::Frame::depths) of a gentle plane, their upper bit flipped.
+/// Depths of a gentle plane, their upper bit flipped, as the plane's own is.
 #[inline(always)]
-fn depths<S: Simd, L: Lanes<S>>(simd: S, loaded: &Loaded<L>, depth: &DepthPlane, bits: u32) -> L {
+fn depths<S: Simd, L: Lanes<S>>(
+    simd: S,
+    loaded: &Loaded<L>,
+    [z, dzdx, dzdy]: [i32; 3],
+    bits: u32,
+) -> L {
     let [x, y] = loaded.offsets;
-    let across = x.mul(L::splat(simd, depth.dzdx));
-    let down = y.mul(L::splat(simd, depth.dzdy));
-    let centre = L::splat(simd, (depth.z.0 ^ SIGN) as i32);
-    let z = across.add(down).shift_right(4).add(centre);
+    let across = x.mul(L::splat(simd, dzdx));
+    let down = y.mul(L::splat(simd, dzdy));
+    let z = across.add(down).shift_right(4).add(L::splat(simd, z));
     if bits == 32 { z } else { z.or(L::splat(simd, ((1_u64 << (32 - bits)) - 1) as i32)) }
+}
+
+/// [`Frame::depths`] of any plane, their upper bit flipped; `None` where one is at the near
+/// end of the range.
+#[cold]
+#[inline(never)]
+fn depths_of_any<const N: usize>(
+    frame: &Frame,
+    fragment: &Fragment,
+    bits: u32,
+) -> Option<<Count<N> as Width>::Row>
+where
+    Count<N>: Width,
+{
+    let depths = frame.depths::<N>(fragment, bits);
+    let word = |s: usize| depths.get(s).map_or(0, |z| (z.0 ^ SIGN) as i32);
+    depths.iter().all(|z| z.0 > 0).then(|| Count::<N>::row(word))
 }

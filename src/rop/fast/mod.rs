@@ -17,10 +17,10 @@ mod state;
 mod tally;
 mod tracked;
 
-pub use engine::{FastEngine, FastSampler, Loaded, Offered};
+pub use engine::{FastEngine, FastSampler, Loaded, Offered, Row};
 pub use lanes::{Count, Lanes, Width, levels};
 pub use rank::{in_sample_order, picked, ranks, ranks_of_any, ranks_of_distinct};
-pub use references::{FastReferences, HashBy, Numbered, PublishedHash, below};
+pub use references::{Base, FastReferences, HashBy, Limit, Numbered, PublishedHash, below};
 pub use state::FastTile;
 pub use tally::Tally;
 pub use tracked::{FastTracked, Given, Published, Rules, is_published};

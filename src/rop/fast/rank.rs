@@ -23,10 +23,9 @@ pub fn ranks<S: Simd, L: Lanes<S>>(simd: S, keys: L, words: &[i32], among: u64) 
 #[inline(always)]
 fn of_all<S: Simd, L: Lanes<S>>(simd: S, keys: L, among: u64) -> L {
     let less = keys.sub(L::splat(simd, 1));
-    // What is not among them comes before everybody, and is taken off again.
-    let others = L::select(L::mask(simd, among), less, L::splat(simd, i32::MIN));
-    let outside = L::LEN as i32 - among.count_ones() as i32;
-    let mut ranks = L::splat(simd, LAST + outside);
+    // What is not among them comes before nobody.
+    let others = L::select(L::mask(simd, among), less, L::splat(simd, i32::MAX));
+    let mut ranks = L::splat(simd, LAST);
     let mut words = [0; 8];
     others.store(&mut words[..L::LEN]);
     for (j, word) in words[..L::LEN].iter().enumerate() {
@@ -109,7 +108,9 @@ pub fn picked<S: Simd, L: Lanes<S>>(simd: S, hits: u64, ranks: L, among: L::Mask
         let upper = L::splat(simd, (hits >> 32) as u32 as i32);
         bits = L::select(ranks.negative(simd), upper, bits);
     }
-    L::both(bits.shift_left_by(ranks).negative(simd), among)
+    // Nothing to shift, rather than a mask at the end: that would be waited for.
+    let bits = L::select(among, bits, L::splat(simd, 0));
+    bits.shift_left_by(ranks).negative(simd)
 }
 
 #[cfg(test)]

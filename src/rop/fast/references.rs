@@ -7,7 +7,9 @@ use crate::rop::event::Probe;
 use crate::rop::fast::engine::Loaded;
 use crate::rop::fast::lanes::Lanes;
 use crate::rop::fast::tally::Tally;
-use crate::rop::reference_value::{LK2011, Reference, ReferenceKey};
+use crate::rop::opacity::Threshold;
+use crate::rop::reference_value::{LK2011, Reference, ReferenceKey, scramble_lk2011};
+use crate::rop::stochastic::Round;
 use crate::rop::tracked::{Hashed, References, SampleOf};
 
 /// The samples of a fragment that are to be numbered.
@@ -15,10 +17,46 @@ use crate::rop::tracked::{Hashed, References, SampleOf};
 pub struct Numbered<'a> {
     /// What they have in common; [`SampleOf::first`] is set.
     pub of: SampleOf<'a>,
+    /// The threshold once more.
+    pub limit: Limit,
+    /// What their values have in common, but for the surface.
+    pub base: Base,
+    /// The surface before the fragment. What
+    /// is made of a surface need not wait for `starts`: it can be made of both.
+    pub before: u32,
+    /// Whether the fragment starts the next one.
+    pub starts: bool,
     /// The first one's number in its surface.
     pub first: u32,
     /// How many they are.
     pub count: u32,
+}
+
+/// What the values of a pixel have in common in a round: the part of the place in a
+/// sequence that the pixel gives, its bits in reverse, and how far seed and frame move
+/// the values.
+#[derive(Clone, Copy, Default, Debug)]
+pub struct Base {
+    reversed: u32,
+    moved: u32,
+}
+
+impl Base {
+    /// Of the pixel of this index, whose values are those from the `earlier`-th of `total`.
+    #[inline]
+    pub fn of(earlier: u32, total: u32, pixel: u32, seed: u32) -> Self {
+        let first = u64::from(earlier) + u64::from(pixel) * u64::from(total);
+        // On frames of more than 2^32 samples.
+        let beyond = if first >> 32 != 0 { scatter((first >> 32) as u32) } else { 0 };
+        Base { reversed: (first as u32).reverse_bits(), moved: scatter(seed).wrapping_add(beyond) }
+    }
+
+    /// The first of the values of figure 4, for a surface.
+    #[inline(always)]
+    pub fn first_lk2011(self, surface: u32) -> u32 {
+        let moved = surface.wrapping_add(self.moved);
+        scramble_lk2011(self.reversed.wrapping_add(moved))
+    }
 }
 
 /// [`References`] a fragment at a time.
@@ -32,6 +70,11 @@ pub trait FastReferences<const N: usize>: Copy + Send + Sync + 'static {
     fn to_plain(kept: Self::Kept) -> <Self::Plain as References>::Kept;
     /// The other way.
     fn of_plain(kept: &<Self::Plain as References>::Kept) -> Self::Kept;
+
+    /// What a pixel's values have in common in a round.
+    fn base(round: &Round, pixel: u32, seed: u32) -> Base {
+        Base::of(round.index * N as u32, round.count * N as u32, pixel, seed)
+    }
 
     /// Which of the samples pass the opacity test: bit `i` for the `i`-th of them.
     /// Bits beyond their count hold anything.
@@ -51,11 +94,16 @@ pub struct PublishedHash;
 
 /// A hash for each sample.
 pub trait HashBy: Copy + Send + Sync + 'static {
+    /// Whether it is known when the kernel is compiled, and keys are as they are.
+    const KNOWN: bool;
+
     /// Which one.
     fn reference(&self) -> Reference;
 }
 
 impl HashBy for PublishedHash {
+    const KNOWN: bool = true;
+
     #[inline(always)]
     fn reference(&self) -> Reference {
         Reference::Lk2011
@@ -63,6 +111,8 @@ impl HashBy for PublishedHash {
 }
 
 impl HashBy for Hashed {
+    const KNOWN: bool = false;
+
     #[inline(always)]
     fn reference(&self) -> Reference {
         self.0
@@ -85,51 +135,85 @@ impl<H: HashBy, const N: usize> FastReferences<N> for H {
         samples: Numbered<'_>,
         tally: &mut Tally<'_, P>,
     ) -> u64 {
-        hashed::<S, L, P, N>(self.reference(), simd, loaded, samples, tally)
+        tally.hashed(samples.count);
+        if H::KNOWN && L::LEN <= 8 {
+            return ahead(simd, loaded, &samples);
+        }
+        hashed::<S, L, N>(self.reference(), simd, loaded, &samples)
     }
 }
 
 /// The values of all numbers that a surface can have, and those of them from the
 /// first sample's on: which number goes to which sample need not be known yet.
 #[inline(always)]
-fn hashed<S: Simd, L: Lanes<S>, P: Probe, const N: usize>(
+fn hashed<S: Simd, L: Lanes<S>, const N: usize>(
     reference: Reference,
     simd: S,
     loaded: &Loaded<L>,
-    samples: Numbered<'_>,
-    tally: &mut Tally<'_, P>,
+    samples: &Numbered<'_>,
 ) -> u64 {
-    let Numbered { of: SampleOf { key, round, opacity, .. }, first, count } = samples;
-    tally.hashed(count);
-    let total = round.count * N as u32;
-    // Below 2^6 · 2^3 of the index are the numbers, above them the pixel: its bits
-    // reversed are joined without a carry.
-    let base = u64::from(round.index * N as u32) + u64::from(key.pixel.0) * u64::from(total);
-    let mut moved = key.surface.wrapping_add(scatter(key.seed));
-    // On frames of more than 2^32 samples.
-    if base >> 32 != 0 {
-        moved = moved.wrapping_add(scatter((base >> 32) as u32));
-    }
-    let place = L::splat(simd, (base as u32).reverse_bits() as i32);
-    let place = loaded.reversed.or(place);
+    let Numbered { of: SampleOf { key, round, .. }, limit, base, first, .. } = *samples;
+    let moved = key.surface.wrapping_add(base.moved);
+    let place = places(simd, loaded, base);
     let values = match reference {
         Reference::Lk2011 => lk2011(simd, place.add(L::splat(simd, moved as i32))),
         Reference::VegdahlV2 => vegdahl_v2(simd, place, moved),
         Reference::Vegdahl => vegdahl(simd, place, moved),
-        _ => one_by_one::<S, L, N>(reference, simd, round.index * N as u32, total, key),
+        _ => one_by_one::<S, L, N>(reference, simd, round, key),
     };
-    let passing = below(simd, values, opacity.value());
-    passing >> (first & 63)
+    below(simd, values, limit).wrapping_shr(first)
 }
 
-/// Where values lie below a threshold from 0 to 2^32.
+/// [`hashed`] for the current surface and for the next, before it is known which it will be.
 #[inline(always)]
-pub fn below<S: Simd, L: Lanes<S>>(simd: S, values: L, threshold: u64) -> u64 {
-    // Signed comparisons, as all instruction sets have them.
-    let sign = L::splat(simd, i32::MIN);
-    let limit = L::splat(simd, threshold as u32 as i32 ^ i32::MIN);
-    let all = 0_u64.wrapping_sub(threshold >> 32);
-    L::bits(limit.greater(values.xor(sign))) | all
+fn ahead<S: Simd, L: Lanes<S>>(simd: S, loaded: &Loaded<L>, samples: &Numbered<'_>) -> u64 {
+    let Numbered { limit, base, before, starts, first, .. } = *samples;
+    let place = places(simd, loaded, base);
+    let place = place.add(L::splat(simd, before.wrapping_add(base.moved) as i32));
+    let place = place.pair(place.add(L::splat(simd, 1)));
+    let passing = below(simd, lk2011(simd, place), limit);
+    // What follows the last number of this surface is never looked at; the next one's first
+    // number is 0.
+    passing.wrapping_shr(first + u32::from(starts) * L::LEN as u32)
+}
+
+/// The places of all numbers in a pixel's sequence: below the pixel's part are the
+/// numbers, and reversed, they are joined without a carry.
+#[inline(always)]
+fn places<S: Simd, L: Lanes<S>>(simd: S, loaded: &Loaded<L>, base: Base) -> L {
+    loaded.reversed.or(L::splat(simd, base.reversed as i32))
+}
+
+/// A [`Threshold`] as lanes are compared with it.
+#[derive(Clone, Copy, Debug)]
+pub struct Limit {
+    /// Its lower 32 bits, the upper one of them flipped: all instruction sets compare signed
+    /// words.
+    pub(super) below: i32,
+    /// All bits set where all values lie below it.
+    pub(super) all: u64,
+}
+
+impl Limit {
+    /// That of a threshold.
+    #[inline(always)]
+    pub fn of(threshold: Threshold) -> Self {
+        let value = threshold.value();
+        Limit { below: value as i32 ^ i32::MIN, all: 0_u64.wrapping_sub(value >> 32) }
+    }
+
+    /// The threshold.
+    #[inline(always)]
+    pub fn threshold(self) -> Threshold {
+        Threshold::of_value(u64::from((self.below ^ i32::MIN) as u32) | (self.all & 1) << 32)
+    }
+}
+
+/// Where values lie below a limit.
+#[inline(always)]
+pub fn below<S: Simd, L: Lanes<S>>(simd: S, values: L, limit: Limit) -> u64 {
+    let values = values.xor(L::splat(simd, i32::MIN));
+    L::bits(L::splat(simd, limit.below).greater(values)) | limit.all
 }
 
 /// Figure 4, lines 3 to 6.
@@ -162,10 +246,10 @@ fn vegdahl<S: Simd, L: Lanes<S>>(simd: S, x: L, s: u32) -> L {
 fn one_by_one<S: Simd, L: Lanes<S>, const N: usize>(
     reference: Reference,
     simd: S,
-    earlier: u32,
-    total: u32,
+    round: Round,
     key: &ReferenceKey,
 ) -> L {
+    let (earlier, total) = (round.index * N as u32, round.count * N as u32);
     let mut words = [0; 64];
     for (n, word) in words[..N].iter_mut().enumerate() {
         *word = reference.value(earlier + n as u32, total, key) as i32;

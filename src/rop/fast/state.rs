@@ -5,7 +5,7 @@ use crate::rop::fast::engine::FastSampler;
 use crate::rop::fast::lanes::{Count, Width};
 use crate::rop::over_opaque::OverOpaquePixel;
 use crate::rop::samples::Samples;
-use crate::rop::stochastic::{MethodsPixel, Sampler, Sums};
+use crate::rop::stochastic::{MethodsPixel, Round, Sampler, Sums};
 use crate::tile::TILE_PIXELS;
 use crate::trace::Unorm32;
 
@@ -31,6 +31,8 @@ where
     pub(super) states: Box<[F::State; TILE_PIXELS]>,
     /// Empty where there is a single pass.
     pub(super) sums: Vec<Option<Box<Sums<N>>>>,
+    /// The round for which the states were made ready.
+    pub(super) entered: Option<Round>,
     /// Empty where opaque fragments are drawn like all others.
     pub(super) opaque: Vec<Option<Box<Samples<N>>>>,
 }
@@ -71,6 +73,7 @@ where
             held: boxed(vec![Held::cleared(frame); TILE_PIXELS]),
             states,
             sums: sums.unwrap_or_default(),
+            entered: None,
             opaque: if opaque { vec![None; TILE_PIXELS] } else { Vec::new() },
         }
     }
@@ -103,7 +106,7 @@ where
                 row.as_mut()[s] = channel.to_bits() as i32;
             }
         }
-        self.states[within] = sampler.of_plain(&state);
+        sampler.of_plain(&state, &mut self.states[within]);
         if let Some(slot) = self.sums.get_mut(within) {
             *slot = sums;
         }

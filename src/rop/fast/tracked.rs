@@ -3,23 +3,22 @@
 use fearless_simd::Simd;
 
 use crate::param::Values;
-use crate::rop::design::Site;
 use crate::rop::event::Probe;
 use crate::rop::fast::engine::{FastSampler, Loaded, Offered};
 use crate::rop::fast::lanes::Lanes;
 use crate::rop::fast::rank::{in_sample_order, picked, ranks, ranks_of_any};
-use crate::rop::fast::references::{FastReferences, Numbered};
+use crate::rop::fast::references::{Base, FastReferences, Numbered};
 use crate::rop::fast::tally::Tally;
-use crate::rop::opacity::Threshold;
 use crate::rop::pixel_order::{PixelIndex, PixelOrder};
 use crate::rop::reference_value::{Reference, ReferenceKey};
+use crate::rop::stochastic::Round;
 use crate::rop::surface::{SurfaceRule, SurfaceTracker, Tracked};
 use crate::rop::tracked::{
     COMPACT, PIXEL_ORDER, PREHASH, REFERENCE, References, SORT, SURFACES, SampleOf, TRACK,
     TrackedSampler, TrackedState,
 };
 use crate::rop::{CoveredMask, depth_bits};
-use crate::tile::{TileGrid, TileId};
+use crate::tile::{TILE_PIXELS, TileGrid, TileId};
 use crate::trace::SampleMask;
 
 /// The parameters that the kernel asks for with every fragment.
@@ -143,6 +142,8 @@ pub struct FastTracked<R, F, const N: usize> {
 pub struct Track<K, M> {
     covered: u64,
     surface: u32,
+    /// What its reference values are made of, but for surface and number, in this round.
+    base: Base,
     pixel: PixelIndex,
     kept: K,
     more: M,
@@ -163,6 +164,7 @@ impl<R: Rules, F: FastReferences<N>, const N: usize> FastSampler<N> for FastTrac
         let cleared = |pixel| Track {
             covered: 0,
             surface: 0,
+            base: Base::default(),
             pixel,
             kept: F::Kept::default(),
             more: R::More::default(),
@@ -189,16 +191,21 @@ impl<R: Rules, F: FastReferences<N>, const N: usize> FastSampler<N> for FastTrac
         }
     }
 
-    fn of_plain(&self, plain: &TrackedState<<F::Plain as References>::Kept>) -> Self::State {
+    fn of_plain(
+        &self,
+        plain: &TrackedState<<F::Plain as References>::Kept>,
+        state: &mut Self::State,
+    ) {
         let SurfaceTracker { surface_id, numbered, last, .. } = plain.surface;
-        let mut more = R::More::default();
-        R::keep(&mut more, numbered, last);
-        Track {
-            covered: plain.surface.held().0,
-            surface: surface_id,
-            pixel: plain.pixel_id,
-            kept: F::of_plain(&plain.kept),
-            more,
+        R::keep(&mut state.more, numbered, last);
+        state.covered = plain.surface.held().0;
+        state.surface = surface_id;
+        state.kept = F::of_plain(&plain.kept);
+    }
+
+    fn enter(&self, round: &Round, states: &mut [Self::State; TILE_PIXELS]) {
+        for state in states {
+            state.base = F::base(round, state.pixel.0, round.seed);
         }
     }
 
@@ -222,7 +229,7 @@ impl<R: Rules, F: FastReferences<N>, const N: usize> FastSampler<N> for FastTrac
         tally: &mut Tally<'_, P>,
     ) -> L::Mask {
         let Switches { sort, compact, surfaces, prehash, .. } = self.rules.switches();
-        let Offered { round, stored, words, passed, fragment, coverage } = offered;
+        let Offered { round, stored, words, passed, fragment, coverage, limit } = offered;
         let s = if compact { passed } else { coverage };
         let tracked = if self.counts() { coverage } else { s };
         if surfaces != SurfaceRule::Bitmask && tracked == 0 {
@@ -232,8 +239,8 @@ impl<R: Rules, F: FastReferences<N>, const N: usize> FastSampler<N> for FastTrac
         // 4–8.
         let conflict = tracked & p.covered != 0;
         let source = match surfaces {
-            SurfaceRule::Primitive => Some(fragment.primitive),
-            SurfaceRule::Object => Some(fragment.object),
+            SurfaceRule::Primitive => Some(fragment.primitive()),
+            SurfaceRule::Object => Some(fragment.object()),
             SurfaceRule::Bitmask | SurfaceRule::EveryFragment => None,
         };
         let starts = match surfaces {
@@ -260,11 +267,16 @@ impl<R: Rules, F: FastReferences<N>, const N: usize> FastSampler<N> for FastTrac
 
         // 10–17, the values in the order of the numbers.
         let key = ReferenceKey { pixel: p.pixel, surface, seed: round.seed };
-        let key = if prehash { key.prehashed() } else { key };
-        let opacity = Threshold::of(fragment.alpha);
-        let site = Site { x: fragment.x, y: fragment.y };
+        let (key, base) = match prehash {
+            true => {
+                let key = key.prehashed();
+                (key, F::base(round, key.pixel.0, key.seed))
+            }
+            false => (key, p.base),
+        };
+        let (site, opacity) = (fragment.site(), limit.threshold());
         let of = SampleOf { site, key: &key, round: *round, opacity, first: true };
-        let samples = Numbered { of, first, count };
+        let samples = Numbered { of, limit, base, before: p.surface, starts, first, count };
         let hits = self.references.passing::<S, L, P>(simd, loaded, &mut kept, samples, tally);
 
         // 18.

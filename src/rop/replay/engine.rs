@@ -8,7 +8,7 @@ use crate::rop::design::{Contents, Design, Site, StateBits};
 use crate::rop::event::{EventCounts, NoProbe, Probe, Record};
 use crate::rop::opacity::Threshold;
 use crate::tile::{TILE_PIXELS, TileGrid, TileId};
-use crate::trace::{Fragment, SampleMask};
+use crate::trace::{Block, SampleMask};
 
 /// The pixels of a tile as their design holds them.
 pub type TileState = Box<dyn Any + Send>;
@@ -24,7 +24,7 @@ pub trait Engine: Send + Sync {
     /// A cleared tile.
     fn clear(&self, grid: TileGrid, tile: TileId) -> TileState;
     /// Draws fragments of one tile, in this order.
-    fn draw(&self, pass: u32, state: &mut TileState, fragments: &[Fragment], told: Told<'_>);
+    fn draw(&self, pass: u32, state: &mut TileState, fragments: &Block, told: Told<'_>);
     /// Ends a pass for a tile.
     fn end_pass(&self, pass: u32, grid: TileGrid, tile: TileId, state: &mut TileState);
     /// The colours of a tile.
@@ -63,7 +63,7 @@ impl<D: Design> Engine for D {
         Box::new(pixels)
     }
 
-    fn draw(&self, pass: u32, state: &mut TileState, fragments: &[Fragment], told: Told<'_>) {
+    fn draw(&self, pass: u32, state: &mut TileState, fragments: &Block, told: Told<'_>) {
         let pixels = state.downcast_mut::<Vec<D::Pixel>>().expect("the state is the design's own");
         match told {
             Told::Nobody => draw_all(self, pass, pixels, fragments, &mut NoProbe),
@@ -99,14 +99,14 @@ fn draw_all<D: Design, P: Probe>(
     design: &D,
     pass: u32,
     pixels: &mut [D::Pixel],
-    fragments: &[Fragment],
+    fragments: &Block,
     probe: &mut P,
 ) {
-    for fragment in fragments {
+    for fragment in fragments.iter() {
         let site = Site { x: fragment.x, y: fragment.y };
         let pixel = &mut pixels[TileGrid::within(site.x, site.y)];
         probe.fragment(fragment.coverage);
-        design.draw(pass, site, pixel, fragment, probe);
+        design.draw(pass, site, pixel, &fragment, probe);
     }
 }
 

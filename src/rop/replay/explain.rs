@@ -5,7 +5,7 @@ use crate::rop::design::{Contents, Design, Frame, Site};
 use crate::rop::event::{NoProbe, Record};
 use crate::rop::replay::engine::{Engine, Told};
 use crate::tile::TileGrid;
-use crate::trace::{Fragment, SampleMask, Trace};
+use crate::trace::{Block, Fragment, SampleMask, Trace};
 
 /// One fragment's way through a design.
 #[derive(Clone, Debug, serde::Serialize)]
@@ -66,8 +66,9 @@ pub fn explain(
     for pass in 0..design.passes() {
         for (row, fragment) in &fragments {
             let mut record = Record::default();
-            let one = std::slice::from_ref(fragment);
-            design.draw(pass, &mut state, one, Told::Record(&mut record));
+            let mut one = Block::default();
+            one.push(fragment);
+            design.draw(pass, &mut state, &one, Told::Record(&mut record));
             let contents = design.contents(&state, within);
             steps.push(Step { pass, row: *row, fragment: *fragment, record, contents });
         }

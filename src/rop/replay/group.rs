@@ -19,17 +19,6 @@ pub(super) enum Group {
     Part(TileId, Range<usize>),
 }
 
-impl Group {
-    #[inline]
-    pub fn holds(&self, tile: TileId, x: u16, y: u16) -> bool {
-        match self {
-            Group::Everything => true,
-            Group::Tiles(range) => range.contains(&tile.0),
-            Group::Part(only, within) => tile == *only && within.contains(&TileGrid::within(x, y)),
-        }
-    }
-}
-
 /// Cuts the frame into groups whose fragments take at most the memory limit.
 pub(super) fn group_tiles(
     frame: &Frame,

@@ -153,16 +153,17 @@ pub fn replay(
             }
             let tiles = states.touched_mut().par_iter_mut();
             tiles.for_each(|(tile, state)| {
-                let state = state.as_mut().expect("it has been drawn to");
-                design.end_pass(pass, grid, *tile, state);
+                if let Some(state) = state {
+                    design.end_pass(pass, grid, *tile, state);
+                }
             });
         }
-        let resolved = states.map(|tiles| {
+        let resolved = states.filter_map(|tiles| {
+            // A tile without a state was met by nothing that covers a sample.
             let resolve = |(tile, state): (TileId, Option<TileState>)| {
-                let state = state.expect("it has been drawn to");
-                (tile, design.resolve(grid, tile, &state))
+                Some((tile, design.resolve(grid, tile, &state?)))
             };
-            tiles.into_par_iter().map(resolve).collect()
+            tiles.into_par_iter().filter_map(resolve).collect()
         });
         merge(&mut finished, resolved, group);
     }

@@ -1,44 +1,19 @@
-//! Units of fragments: decoded and sorted by tile, each by one thread.
+//! Units of fragments: stretches of rows in one tile, sorted by tile, each unit by one
+//! thread. What the rows hold stays where it is until it is drawn.
 
 use std::ops::Range;
 
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, dispatch, u16x32};
+
 use crate::rop::design::Frame;
 use crate::rop::replay::group::Group;
-use crate::tile::TileId;
-use crate::trace::{BLOCK, Batch, Decoder, DepthPlane, Footprints, Fragment, SampleMask, Unorm32};
+use crate::tile::{TILE_SIDE, TileGrid, TileId};
+use crate::trace::{Batch, Column, STRETCH, Stretch};
 
-/// Rows of a unit, at most: so many that a tile's fragments in it are worth a call,
-/// so few that threads end a window at about the same time.
-pub(super) const UNIT_ROWS: usize = 1 << 13;
-
-/// A stretch of the trace, its fragments whole and sorted by tile. It is filled again
-/// and again: memory that has been touched is cheaper than fresh memory.
-#[derive(Default)]
-pub(super) struct Unit {
-    /// Fragments, tile after tile, in API order within a tile; then what no tile has.
-    fragments: Vec<Fragment>,
-    /// Tiles in the order in which they were met, and where their fragments end.
-    tiles: Vec<(TileId, u32)>,
-}
-
-/// What a thread needs to sort a unit.
-pub(super) struct Sorter {
-    /// By tile, zero between units: the number of its fragments, then the place of the
-    /// next. The last entry is for fragments that are left out.
-    cursors: Vec<u32>,
-    /// Tile and length of each run of fragments in one tile. Primitives are drawn row by
-    /// row, so that runs are much fewer than fragments.
-    runs: Vec<(u32, u32)>,
-    /// Each fragment's place in the sorted unit, and room for a run's worth more.
-    places: Vec<u32>,
-}
-
-impl Sorter {
-    pub fn new(frame: &Frame) -> Self {
-        let cursors = vec![0; frame.grid.count() + 1];
-        Sorter { cursors, runs: Vec::new(), places: Vec::new() }
-    }
-}
+/// Rows of a unit, at most: so many that a tile's stretches in it are worth a visit, so
+/// few that threads end a window at about the same time.
+const UNIT_ROWS: usize = 1 << 15;
 
 /// Rows of a batch.
 pub(super) struct Part {
@@ -47,174 +22,172 @@ pub(super) struct Part {
 }
 
 impl Part {
-    fn blocks(&self) -> impl Iterator<Item = Range<usize>> {
-        let end = self.rows.end;
-        self.rows.clone().step_by(BLOCK).map(move |start| start..end.min(start + BLOCK))
+    /// The same rows, a unit's at a time.
+    pub fn cut(&self) -> impl Iterator<Item = Part> + '_ {
+        let Part { batch, rows } = self;
+        let starts = rows.clone().step_by(UNIT_ROWS);
+        starts.map(|start| Part {
+            batch: batch.clone(),
+            rows: start..rows.end.min(start + UNIT_ROWS),
+        })
     }
 }
 
-/// What stands in a unit's memory before it is first filled.
-const NOTHING: Fragment = Fragment {
-    x: 0,
-    y: 0,
-    coverage: SampleMask::NONE,
-    depth: DepthPlane { z: Unorm32::NEAR, dzdx: 0, dzdy: 0 },
-    colour: [0.0; 3],
-    alpha: 0.0,
-    primitive: 0,
-    object: 0,
-};
+/// Stretches of a part's rows, sorted by tile. It is filled again and again: memory that
+/// has been touched is cheaper than fresh memory.
+#[derive(Default)]
+pub(super) struct Unit {
+    /// The rows' batch.
+    batch: Option<Batch>,
+    /// Stretches, tile after tile, in API order within a tile.
+    stretches: Vec<Stretch>,
+    /// Tiles in the order in which they were met, and where their stretches end.
+    tiles: Vec<(TileId, u32)>,
+}
+
+/// What a thread needs to sort a unit.
+pub(super) struct Sorter {
+    level: Level,
+    /// By tile, zero between units: the number of its stretches, then the place of the
+    /// next.
+    cursors: Vec<u32>,
+    /// Stretches as they are met, with their tiles.
+    met: Vec<(TileId, Stretch)>,
+}
 
 impl Unit {
-    /// Fills it with those fragments of `parts`, at most [`UNIT_ROWS`], that cover a
-    /// sample of the frame and belong to the group: a counting sort, stable.
-    pub fn fill(&mut self, parts: &[Part], frame: &Frame, group: &Group, sorter: &mut Sorter) {
-        let mask = SampleMask::first(frame.samples());
-        let rows = sorter.count(parts, frame, group, mask, &mut self.tiles);
-        sorter.place(rows, &mut self.tiles);
-        if self.fragments.len() < rows {
-            self.fragments.resize(rows, NOTHING);
-        }
-        let mut places = &sorter.places[..rows];
-        for part in parts {
-            let mut decoder = Decoder::new(&part.batch);
-            for rows in part.blocks() {
-                let (block, later) = places.split_at(rows.len());
-                places = later;
-                decoder.fragments(&rows, |i, mut fragment| {
-                    fragment.coverage = fragment.coverage & mask;
-                    self.fragments[block[i] as usize] = fragment;
-                });
-            }
-        }
+    /// Fills it with those rows of `part` that belong to the group: a counting sort, stable.
+    pub fn fill(&mut self, part: &Part, frame: &Frame, group: &Group, sorter: &mut Sorter) {
+        self.batch = Some(part.batch.clone());
+        sorter.find(part, frame.grid, group, &mut self.tiles);
+        sorter.place(&mut self.stretches, &mut self.tiles);
     }
 
-    /// Its tiles, and where in [`Unit::fragments`] their fragments stand.
+    /// The rows' batch.
+    pub fn batch(&self) -> &Batch {
+        self.batch.as_ref().expect("it has been filled")
+    }
+
+    /// Its tiles, and where in [`Unit::stretches`] they stand.
     pub fn tiles(&self) -> impl Iterator<Item = (TileId, Range<u32>)> {
         let mut start = 0;
         self.tiles.iter().map(move |(tile, end)| (*tile, std::mem::replace(&mut start, *end)..*end))
     }
 
-    /// Fragments of one tile, in API order.
+    /// Stretches of one tile, in API order.
     #[inline]
-    pub fn fragments(&self, range: Range<u32>) -> &[Fragment] {
-        &self.fragments[range.start as usize..range.end as usize]
+    pub fn stretches(&self, range: Range<u32>) -> &[Stretch] {
+        &self.stretches[range.start as usize..range.end as usize]
     }
 }
 
 impl Sorter {
-    /// Counts the fragments of each tile, which `tiles` then names as they were met, and
-    /// notes the runs; tells how many rows there are.
-    fn count(
-        &mut self,
-        parts: &[Part],
-        frame: &Frame,
-        group: &Group,
-        mask: SampleMask,
-        tiles: &mut Vec<(TileId, u32)>,
-    ) -> usize {
-        let mut total = 0;
-        tiles.clear();
-        self.runs.clear();
-        let mut tile_of_row = [0; BLOCK];
-        for part in parts {
-            let mut decoder = Decoder::new(&part.batch);
-            for rows in part.blocks() {
-                find_tiles(decoder.footprints(&rows), frame, group, mask, &mut tile_of_row);
-                let mut starts = [0_u32; BLOCK + 1];
-                let n = find_runs(&tile_of_row[..rows.len()], &mut starts);
-                for run in starts[..=n].windows(2) {
-                    let (tile, length) = (tile_of_row[run[0] as usize], run[1] - run[0]);
-                    let count = &mut self.cursors[tile as usize];
-                    if *count == 0 {
-                        tiles.push((TileId(tile), 0));
-                    }
-                    *count += length;
-                    self.runs.push((tile, length));
-                }
-                total += rows.len();
-            }
-        }
-        total
+    pub fn new(frame: &Frame) -> Self {
+        let cursors = vec![0; frame.grid.count()];
+        Sorter { level: Level::new(), cursors, met: Vec::new() }
     }
 
-    /// Gives each row its place: tile after tile, and last what is left out, which is
-    /// written like the rest, so that no branch has to be foretold, and not looked at.
-    fn place(&mut self, rows: usize, tiles: &mut Vec<(TileId, u32)>) {
-        let left_out = self.cursors.len() - 1;
-        let met = tiles.iter().position(|(tile, _)| tile.0 as usize == left_out);
-        let last = met.map(|place| tiles.remove(place));
+    /// Finds the stretches, counts those of each tile, and names the tiles as they are met.
+    fn find(&mut self, part: &Part, grid: TileGrid, group: &Group, tiles: &mut Vec<(TileId, u32)>) {
+        tiles.clear();
+        self.met.clear();
+        let (met, cursors) = (&mut self.met, &mut self.cursors);
+        let mut add = |tile: TileId, rows: Range<usize>| {
+            let cursor = &mut cursors[tile.0 as usize];
+            if *cursor == 0 {
+                tiles.push((tile, 0));
+            }
+            for start in rows.clone().step_by(STRETCH) {
+                met.push((tile, Stretch::new(start, STRETCH.min(rows.end - start))));
+                *cursor += 1;
+            }
+        };
+        for_each_run(self.level, part, |(x, y), rows| {
+            let tile = grid.tile(x, y);
+            match group {
+                Group::Everything => add(tile, rows),
+                Group::Tiles(range) => {
+                    if range.contains(&tile.0) {
+                        add(tile, rows);
+                    }
+                }
+                Group::Part(only, within) => {
+                    let held = |row: &usize| {
+                        let (x, y) = part.batch.pixel(*row);
+                        tile == *only && within.contains(&TileGrid::within(x, y))
+                    };
+                    rows.filter(held).for_each(|row| add(tile, row..row + 1));
+                }
+            }
+        });
+    }
+
+    /// Sorts what was found.
+    fn place(&mut self, stretches: &mut Vec<Stretch>, tiles: &mut [(TileId, u32)]) {
         let mut end = 0;
         for (tile, tile_end) in tiles.iter_mut() {
-            let cursor = &mut self.cursors[tile.0 as usize];
-            end += std::mem::replace(cursor, end);
+            end += std::mem::replace(&mut self.cursors[tile.0 as usize], end);
             *tile_end = end;
         }
-        if last.is_some() {
-            self.cursors[left_out] = end;
+        stretches.clear();
+        stretches.resize(self.met.len(), Stretch::new(0, 1));
+        for (tile, stretch) in &self.met {
+            let cursor = &mut self.cursors[tile.0 as usize];
+            stretches[*cursor as usize] = *stretch;
+            *cursor += 1;
         }
-        // Places are written a few at a time, beyond the run's end, and then again by
-        // the next run: most runs take one step.
-        const STEP: usize = 16;
-        self.places.resize(self.places.len().max(rows + STEP), 0);
-        let mut start = 0;
-        for (tile, length) in &self.runs {
-            let cursor = &mut self.cursors[*tile as usize];
-            let (first, length) = (*cursor, *length as usize);
-            *cursor += length as u32;
-            for done in (0..length).step_by(STEP) {
-                let places = &mut self.places[start + done..][..STEP];
-                for (i, place) in places.iter_mut().enumerate() {
-                    *place = first + (done + i) as u32;
-                }
-            }
-            start += length;
-        }
-        for (tile, _) in tiles.iter() {
+        for (tile, _) in tiles {
             self.cursors[tile.0 as usize] = 0;
         }
-        self.cursors[left_out] = 0;
     }
 }
 
-/// Where the runs of equal tiles begin, and, after them, where the last one ends; tells how
-/// many there are.
-#[inline]
-fn find_runs(tiles: &[u32], starts: &mut [u32; BLOCK + 1]) -> usize {
-    let mut n = 0;
-    let mut last = u32::MAX;
-    for (i, tile) in tiles.iter().enumerate() {
-        // Written always and kept where a run begins: no branch.
-        starts[n.min(BLOCK)] = i as u32;
-        n += usize::from(*tile != last);
-        last = *tile;
+/// Rows that are compared at a time.
+const STEP: usize = 32;
+
+/// Tells `each` the runs of rows in one tile, with the pixel of the first. Primitives are
+/// drawn row by row, so that runs are much fewer than fragments.
+fn for_each_run(level: Level, part: &Part, mut each: impl FnMut((u16, u16), Range<usize>)) {
+    let Part { batch, rows } = part;
+    let columns = batch.places().map(|column| match column {
+        // Where all are in one column or row, nothing changes.
+        Column::Constant(_) => &[],
+        Column::Values(values) => &values[rows.clone()],
+    });
+    let mut start = rows.start;
+    let mut next = |end: usize| {
+        let run = std::mem::replace(&mut start, end)..end;
+        each(batch.pixel(run.start), run);
+    };
+    dispatch!(level, simd => find_changes(simd, columns, rows.len(), |i| next(rows.start + i)));
+    if !rows.is_empty() {
+        next(rows.end);
     }
-    starts[n.min(BLOCK)] = tiles.len() as u32;
-    n.min(BLOCK)
 }
 
-/// The tile of each fragment; one past the frame's tiles for those that are left out.
-#[inline]
-fn find_tiles(
-    footprints: Footprints<'_>,
-    frame: &Frame,
-    group: &Group,
-    mask: SampleMask,
-    tiles: &mut [u32; BLOCK],
-) {
-    let left_out = frame.grid.count() as u32;
-    let Footprints { x, y, coverage } = footprints;
-    let pixels = x.iter().zip(y);
-    for ((tile, (x, y)), coverage) in tiles.iter_mut().zip(pixels.clone()).zip(coverage) {
-        // Chosen by a mask: a branch would be mispredicted wherever coverage is mixed.
-        let held = u32::from(coverage & mask.0 != 0).wrapping_neg();
-        *tile = frame.grid.tile(*x, *y).0 & held | left_out & !held;
+/// Tells `at` where a pixel lies in another tile than the one before it: pixels in columns
+/// and rows, of which one may be left out.
+#[inline(always)]
+fn find_changes<S: Simd>(simd: S, columns: [&[u16]; 2], len: usize, mut at: impl FnMut(usize)) {
+    const TILE: u16 = !(TILE_SIDE as u16 - 1);
+    let given = || columns.into_iter().filter(|column| !column.is_empty());
+    let (tile, none) = (u16x32::splat(simd, TILE), u16x32::splat(simd, 0));
+    let mut i = 1;
+    while i + STEP <= len {
+        let mut changes = 0;
+        for column in given() {
+            let [before, here] = [i - 1, i].map(|i| u16x32::from_slice(simd, &column[i..i + STEP]));
+            changes |= ((before ^ here) & tile).simd_gt(none).to_bitmask();
+        }
+        while changes != 0 {
+            at(i + changes.trailing_zeros() as usize);
+            changes &= changes - 1;
+        }
+        i += STEP;
     }
-    if *group != Group::Everything {
-        for (tile, (x, y)) in tiles.iter_mut().zip(pixels) {
-            if !group.holds(TileId(*tile), *x, *y) {
-                *tile = left_out;
-            }
+    for i in i..len {
+        if given().any(|column| (column[i] ^ column[i - 1]) & TILE != 0) {
+            at(i);
         }
     }
 }
@@ -222,45 +195,59 @@ fn find_tiles(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Stream;
+    use crate::rop::fast::levels;
 
+    /// Runs that end where a vector does, and elsewhere; one row or column for all.
     #[test]
-    fn runs_begin_where_the_tile_changes() {
-        let mut starts = [0; BLOCK + 1];
-        let n = find_runs(&[4, 4, 4, 7, 4, 4, 9], &mut starts);
-        assert_eq!((n, &starts[..=n]), (4, &[0, 3, 4, 6, 7][..]));
-        assert_eq!(find_runs(&[], &mut starts), 0);
-        let changing: Vec<u32> = (0..BLOCK as u32).collect();
-        let n = find_runs(&changing, &mut starts);
-        assert_eq!((n, starts[n]), (BLOCK, BLOCK as u32));
+    fn changes_are_where_the_tile_changes() {
+        let mut random = Stream::new([5]);
+        for len in [0, 1, 2, 31, 32, 33, 64, 65, 200] {
+            for changing in [1, 3, 40] {
+                let (mut x, mut y) = (0, 0);
+                let mut step = |_| {
+                    match random.below(changing) {
+                        0 => x = random.below(40) as u16,
+                        1 => y = random.below(40) as u16 * 1600,
+                        _ => {}
+                    }
+                    (x, y)
+                };
+                let (x, y): (Vec<u16>, Vec<u16>) = (0..len).map(&mut step).unzip();
+                for columns in [[&x[..], &y], [&x, &[]], [&[], &y], [&[], &[]]] {
+                    let tile = |i: usize| columns.map(|c| c.get(i).map(|v| v / 16));
+                    let expected: Vec<usize> =
+                        (1..len).filter(|i| tile(*i) != tile(i - 1)).collect();
+                    for (name, level) in levels() {
+                        let mut found = Vec::new();
+                        dispatch!(level, simd => {
+                            find_changes(simd, columns, len, |i| found.push(i))
+                        });
+                        assert_eq!(found, expected, "{name}: {columns:?}");
+                    }
+                }
+            }
+        }
     }
 
-    /// Tiles as they were met, what is left out behind them, rows of a tile in order;
-    /// with a run longer than a step.
+    /// Tiles as they were met, stretches of a tile in order, long runs in pieces.
     #[test]
-    fn places_are_a_stable_sort() {
-        let left_out = 9;
-        let tile_of_row: Vec<u32> =
-            [vec![5; 3], vec![left_out; 2], vec![2; 40], vec![5; 1], vec![left_out], vec![2; 7]]
-                .concat();
-        let mut sorter =
-            Sorter { cursors: vec![0; left_out as usize + 1], runs: vec![], places: vec![] };
+    fn stretches_are_sorted_by_tile() {
+        let frame_tiles = 10;
+        let mut sorter = Sorter { level: Level::new(), cursors: vec![0; frame_tiles], met: vec![] };
+        let list = [(5, 0), (2, 3), (5, 9), (9, 11), (2, 12)];
         let mut tiles = Vec::new();
-        for (first, tile) in tile_of_row.iter().enumerate() {
-            if !tile_of_row[..first].contains(tile) {
-                tiles.push((TileId(*tile), 0));
+        for (tile, start) in list {
+            if sorter.cursors[tile] == 0 {
+                tiles.push((TileId(tile as u32), 0));
             }
-            sorter.cursors[*tile as usize] += 1;
+            sorter.cursors[tile] += 1;
+            sorter.met.push((TileId(tile as u32), Stretch::new(start, 1)));
         }
-        let run = |run: &[u32]| (run[0], run.len() as u32);
-        sorter.runs = tile_of_row.chunk_by(|a, b| a == b).map(run).collect();
-        sorter.place(tile_of_row.len(), &mut tiles);
-        assert_eq!(tiles, [(TileId(5), 4), (TileId(2), 51)]);
+        let mut stretches = Vec::new();
+        sorter.place(&mut stretches, &mut tiles);
+        assert_eq!(tiles, [(TileId(5), 2), (TileId(2), 4), (TileId(9), 5)]);
+        assert_eq!(stretches, [0, 9, 3, 12, 11].map(|start| Stretch::new(start, 1)));
         assert!(sorter.cursors.iter().all(|cursor| *cursor == 0));
-        let rank = |tile: u32| [5, 2, left_out].iter().position(|t| *t == tile);
-        let mut expected: Vec<usize> = (0..tile_of_row.len()).collect();
-        expected.sort_by_key(|row| rank(tile_of_row[*row]));
-        for (place, row) in expected.into_iter().enumerate() {
-            assert_eq!(sorter.places[row] as usize, place);
-        }
     }
 }

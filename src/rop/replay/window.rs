@@ -6,6 +6,7 @@ use std::collections::VecDeque;
 use std::ops::Range;
 use std::sync::Mutex;
 
+use fearless_simd::Level;
 use rayon::prelude::*;
 
 use crate::error::Result;
@@ -13,9 +14,9 @@ use crate::rop::design::Frame;
 use crate::rop::event::EventCounts;
 use crate::rop::replay::engine::{Engine, TileState, Told};
 use crate::rop::replay::group::Group;
-use crate::rop::replay::unit::{Part, Sorter, UNIT_ROWS, Unit};
+use crate::rop::replay::unit::{Part, Sorter, Unit};
 use crate::tile::{TileId, TileMap};
-use crate::trace::Trace;
+use crate::trace::{Block, SampleMask, Trace};
 
 /// Fragments of a window for each thread: two windows' worth are held, decoded, and
 /// what stays in the nearer caches between sorting and drawing is worth more than
@@ -47,8 +48,8 @@ pub(super) struct Windows<'a> {
 }
 
 /// A window's fragments, sorted into tiles.
-#[derive(Default)]
 pub(super) struct Window {
+    level: Level,
     /// How many rows it was made of.
     pub rows: usize,
     units: Vec<Unit>,
@@ -64,7 +65,7 @@ struct Work {
     last: u32,
 }
 
-/// A tile's fragments in one unit, and the run in the next unit that has some, or itself.
+/// A tile's stretches in one unit, and the run in the next unit that has some, or itself.
 struct Run {
     unit: u32,
     range: Range<u32>,
@@ -154,15 +155,15 @@ impl<'a> Windows<'a> {
     /// Sorts `parts` into the window's units; tells how many it takes.
     fn sort(&self, parts: &[Part], window: &mut Window) -> usize {
         window.rows = parts.iter().map(|part| part.rows.len()).sum();
-        let units = window.rows.div_ceil(UNIT_ROWS);
+        let parts: Vec<Part> = parts.iter().flat_map(Part::cut).collect();
+        let units = parts.len();
         if window.units.len() < units {
             window.units.resize_with(units, Unit::default);
         }
-        window.units[..units].par_iter_mut().enumerate().for_each(|(i, unit)| {
-            let parts = cut(parts, i * UNIT_ROWS..(i + 1) * UNIT_ROWS);
+        window.units[..units].par_iter_mut().zip(&parts).for_each(|(unit, part)| {
             let idle = self.sorters.lock().expect("no thread panicked").pop();
             let mut sorter = idle.unwrap_or_else(|| Sorter::new(self.frame));
-            unit.fill(&parts, self.frame, self.group, &mut sorter);
+            unit.fill(part, self.frame, self.group, &mut sorter);
             self.sorters.lock().expect("no thread panicked").push(sorter);
         });
         units
@@ -193,20 +194,11 @@ impl<'a> Windows<'a> {
     }
 }
 
-/// Those rows that are rows `range` of all the parts together.
-fn cut(parts: &[Part], range: Range<usize>) -> Vec<Part> {
-    let mut found = Vec::new();
-    let mut start = 0;
-    for Part { batch, rows } in parts {
-        let end = start + rows.len();
-        let (from, to) = (range.start.max(start), range.end.min(end));
-        if from < to {
-            let rows = rows.start + (from - start)..rows.start + (to - start);
-            found.push(Part { batch: batch.clone(), rows });
-        }
-        start = end;
+impl Default for Window {
+    fn default() -> Self {
+        let (units, work, runs) = Default::default();
+        Window { level: Level::new(), rows: 0, units, work, runs }
     }
-    found
 }
 
 impl Window {
@@ -226,27 +218,23 @@ impl Window {
             let slot = states.touch(work.tile, || None);
             lent.push((states.touched_mut()[slot].1.take(), work, slot));
         }
-        let draw_tile = |(state, work, _): &mut (Option<TileState>, &Work, usize)| {
-            let mut counts = count.then(EventCounts::default);
-            let state = state.get_or_insert_with(|| design.clear(frame.grid, work.tile));
-            let mut next = work.first;
-            loop {
-                let run = &self.runs[next as usize];
-                let told = counts.as_mut().map_or(Told::Nobody, Told::Counts);
-                let fragments = self.units[run.unit as usize].fragments(run.range.clone());
-                design.draw(pass, state, fragments, told);
-                if next == work.last {
-                    break counts.unwrap_or_default();
-                }
-                next = run.next;
-            }
-        };
+        let draw_tile =
+            |block: &mut Block, (state, work, _): &mut (Option<TileState>, &Work, usize)| {
+                let mut counts = count.then(EventCounts::default);
+                self.for_each_block(work, SampleMask::first(frame.samples()), block, |block| {
+                    let state = state.get_or_insert_with(|| design.clear(frame.grid, work.tile));
+                    let told = counts.as_mut().map_or(Told::Nobody, Told::Counts);
+                    design.draw(pass, state, block, told);
+                });
+                counts.unwrap_or_default()
+            };
         let events = if count {
             let merge = |a: EventCounts, b: EventCounts| a.merged(&b);
-            lent.par_iter_mut().map(draw_tile).reduce(EventCounts::default, merge)
+            let tiles = lent.par_iter_mut().map_init(Block::default, draw_tile);
+            tiles.reduce(EventCounts::default, merge)
         } else {
-            lent.par_iter_mut().for_each(|tile| {
-                draw_tile(tile);
+            lent.par_iter_mut().for_each_init(Block::default, |block, tile| {
+                draw_tile(block, tile);
             });
             EventCounts::default()
         };
@@ -254,5 +242,40 @@ impl Window {
             states.touched_mut()[slot].1 = state;
         }
         events
+    }
+
+    /// Tells `each` a tile's fragments, a block at a time; `block` is where they are put.
+    fn for_each_block(
+        &self,
+        work: &Work,
+        mask: SampleMask,
+        block: &mut Block,
+        mut each: impl FnMut(&Block),
+    ) {
+        let mut pass_on = |block: &mut Block| {
+            if !block.is_empty() {
+                each(block);
+            }
+            block.clear();
+        };
+        let mut next = work.first;
+        loop {
+            let run = &self.runs[next as usize];
+            let unit = &self.units[run.unit as usize];
+            let mut stretches = unit.stretches(run.range.clone());
+            loop {
+                let taken = block.gather(self.level, unit.batch(), stretches, mask);
+                stretches = &stretches[taken..];
+                if stretches.is_empty() {
+                    break;
+                }
+                pass_on(block);
+            }
+            if next == work.last {
+                break;
+            }
+            next = run.next;
+        }
+        pass_on(block);
     }
 }
