@@ -4,18 +4,20 @@
 //! The engine here does next to nothing, so that what is left is the replay's own. Every
 //! bench first checks what it is about to time.
 
+mod common;
+
 use std::hint::black_box;
 
+use common::captured;
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
-use screendoor::capture::{Capture, CaptureOptions};
 use screendoor::picture::TilePixels;
 use screendoor::rop::{
     Contents, Engine, Frame, ReplayOptions, Replayed, StateBits, TileState, Told, replay,
 };
 use screendoor::tile::{TILE_PIXELS, TileGrid, TileId};
-use screendoor::trace::{Block, Compression, Trace, TraceWriter, WriteOptions};
+use screendoor::trace::{Block, Compression, Trace, WriteOptions};
 
 /// Layers over every pixel: two million fragments.
 const SCENE: &str = "builtin:layers:count=32,alpha=0.1,coloured=true";
@@ -67,20 +69,10 @@ impl Engine for Counting {
 
 /// The trace with its columns stored in each way, in memory: no file system is timed.
 fn traces() -> Vec<(&'static str, Trace)> {
-    let scene = screendoor::scene::load(SCENE).expect("it is built in");
-    let options = CaptureOptions { width: SIDE, height: SIDE, ..CaptureOptions::default() };
-    let capture = Capture::new(&scene, &options).expect("the options are good");
-    let captured = capture.to_memory(|_, _| ()).expect("it is captured");
+    let captured = captured(SCENE, SIDE);
     let store = |(name, compression)| {
         let options = WriteOptions { compression, ..WriteOptions::default() };
-        let header = captured.header().clone();
-        let mut writer = TraceWriter::new(Vec::new(), name, header, options).expect("it writes");
-        for batch in captured.batches() {
-            for fragment in batch.expect("it reads").iter() {
-                writer.push(&fragment).expect("it writes");
-            }
-        }
-        let bytes = writer.finish().expect("it writes").0;
+        let bytes = common::write(&captured, Vec::new(), options);
         (name, Trace::from_bytes(bytes, name).expect("it opens"))
     };
     COMPRESSIONS.into_iter().map(store).collect()

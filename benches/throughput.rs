@@ -3,6 +3,8 @@
 //! `cargo bench` runs all; `cargo bench -- replay/lk` a part. Every bench first
 //! checks what it is about to time against the hashes in `traces/`.
 
+mod common;
+
 use std::collections::HashMap;
 use std::hint::black_box;
 use std::path::Path;
@@ -12,7 +14,7 @@ use rayon::ThreadPoolBuilder;
 use screendoor::capture::{Capture, CaptureOptions};
 use screendoor::design::DESIGNS;
 use screendoor::rop::ReplayOptions;
-use screendoor::trace::{Compression, Trace, TraceWriter, WriteOptions};
+use screendoor::trace::{Compression, Trace, WriteOptions};
 
 /// The trace that is timed, and the scene it is made of (`traces/README.md`).
 const TRACE: &str = "engine";
@@ -54,14 +56,8 @@ fn capture(c: &mut Criterion) {
 /// The same trace in memory, its columns stored otherwise.
 fn stored(source: &Trace, compression: Compression) -> Trace {
     let options = WriteOptions { compression, ..WriteOptions::default() };
-    let header = source.header().clone();
-    let mut writer = TraceWriter::new(Vec::new(), TRACE, header, options).expect("it writes");
-    for batch in source.batches() {
-        for fragment in batch.expect("it reads").iter() {
-            writer.push(&fragment).expect("it writes");
-        }
-    }
-    Trace::from_bytes(writer.finish().expect("it writes").0, TRACE).expect("it opens")
+    let bytes = common::write(source, Vec::new(), options);
+    Trace::from_bytes(bytes, TRACE).expect("it opens")
 }
 
 fn read(c: &mut Criterion) {

@@ -259,17 +259,17 @@ impl<const N: usize> FastReferences<N> for Summed {
         samples: Numbered<'_>,
         tally: &mut Tally<'_, P>,
     ) -> u64 {
-        let Numbered { of, limit, base, before, starts, count, .. } = samples;
+        let Numbered { of, limit, base, starts, count, .. } = samples;
         let (phase, begun) = *kept;
         tally.hashed(u32::from(!begun && count > 0));
         let threshold = limit.threshold().value() as u32;
         let earlier = threshold.wrapping_mul(of.round.index * N as u32);
         // Of the next surface in any case: then it need not be waited for.
-        let next = base.first_lk2011(before.wrapping_add(1)).wrapping_add(earlier);
+        let next = base.of_surface(1).first_lk2011().wrapping_add(earlier);
         let start = match (starts, begun) {
             (true, _) => next,
             (false, true) => phase,
-            (false, false) => first(base, before).wrapping_add(earlier),
+            (false, false) => first(base).wrapping_add(earlier),
         };
         *kept = (start.wrapping_add(threshold.wrapping_mul(count)), begun || count > 0);
         evenly(simd, loaded, start, limit)
@@ -279,8 +279,8 @@ impl<const N: usize> FastReferences<N> for Summed {
 /// The random number of a pixel's very first surface.
 #[cold]
 #[inline(never)]
-fn first(base: Base, surface: u32) -> u32 {
-    base.first_lk2011(surface)
+fn first(base: Base) -> u32 {
+    base.first_lk2011()
 }
 
 #[cfg(test)]

@@ -96,11 +96,11 @@ impl Block {
 
     /// How many rows it holds.
     #[inline]
-    pub fn len(&self) -> usize {
+    pub fn rows(&self) -> usize {
         self.len
     }
 
-    /// Whether none of its rows is a fragment.
+    /// Whether it holds no fragment.
     pub fn is_empty(&self) -> bool {
         self.coverage[..self.len].iter().all(|mask| *mask == 0)
     }

@@ -44,7 +44,7 @@ impl Prepared {
             all: [0; BLOCK],
         };
         // Whole vectors: what lies beyond the block's length is not looked at.
-        for i in 0..block.len().next_multiple_of(16).min(BLOCK) {
+        for i in 0..block.rows().next_multiple_of(16).min(BLOCK) {
             let gentle = is_gentle(block.z[i], block.dzdx[i], block.dzdy[i]);
             let beyond = u16::from(!gentle) * TILE_PIXELS as u16;
             prepared.within[i] = TileGrid::within(block.x[i], block.y[i]) as u16 | beyond;
@@ -53,7 +53,7 @@ impl Prepared {
             (prepared.limit[i], prepared.all[i]) = (below, all);
         }
         let mut count = 0;
-        for (i, coverage) in block.coverage[..block.len().min(BLOCK)].iter().enumerate() {
+        for (i, coverage) in block.coverage[..block.rows().min(BLOCK)].iter().enumerate() {
             prepared.rows[count % BLOCK] = i as u8;
             count += usize::from(*coverage != 0);
         }

@@ -5,7 +5,7 @@
 //! written once and compiled for each instruction set.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Level, Select, Simd, i32x4, i32x8, i32x16, mask32x4, mask32x8, mask32x16};
+use fearless_simd::{Level, Select, Simd, i32x4, i32x8, i32x16};
 
 /// A count of samples as a type.
 #[derive(Clone, Copy, Debug)]
@@ -26,8 +26,6 @@ pub trait Width: Send + Sync + 'static {
 pub trait Lanes<S: Simd>: Copy {
     /// One truth value a lane.
     type Mask: Copy;
-    /// Twice as many lanes: with few, two rows take no more instructions than one.
-    type Twice: Lanes<S>;
 
     /// How many there are.
     const LEN: usize;
@@ -68,16 +66,6 @@ pub trait Lanes<S: Simd>: Copy {
     fn mask(simd: S, bits: u64) -> Self::Mask;
     /// One bit a lane.
     fn bits(mask: Self::Mask) -> u64;
-    /// These lanes, then the other ones.
-    ///
-    /// # Panics
-    /// Where the lanes fill the widest vector already, more than eight.
-    fn pair(self, other: Self) -> Self::Twice;
-    /// The lower half of the lanes and the upper, lane by lane.
-    ///
-    /// # Panics
-    /// As [`Lanes::pair`].
-    fn sum_of_halves(twice: Self::Twice) -> Self;
 }
 
 /// `K` vectors side by side.
@@ -102,175 +90,151 @@ impl<V: Copy, const K: usize> Vectors<V, K> {
     }
 }
 
-macro_rules! lanes {
-    ($($vector:ident, $mask:ident, $wide:ident, $pair:expr, $split:expr;)+) => {
-        $(impl<S: Simd, const K: usize> Lanes<S> for Vectors<$vector<S>, K> {
-            type Mask = [$mask<S>; K];
-            type Twice = Vectors<$wide<S>, K>;
+impl<S, V, M, const K: usize> Lanes<S> for Vectors<V, K>
+where
+    S: Simd,
+    V: SimdInt<S, Element = i32, Mask = M>,
+    M: SimdMask<S, Element = i32, Ints = V> + Select<V>,
+{
+    type Mask = [M; K];
 
-            const LEN: usize = K * <$vector<S>>::LEN;
+    const LEN: usize = K * V::LEN;
 
+    #[inline(always)]
+    fn splat(simd: S, word: i32) -> Self {
+        Vectors([V::splat(simd, word); K])
+    }
+    #[inline(always)]
+    fn load(simd: S, words: &[i32]) -> Self {
+        let words = &words[..Self::LEN];
+        Vectors(std::array::from_fn(
             #[inline(always)]
-            fn splat(simd: S, word: i32) -> Self {
-                Vectors([$vector::splat(simd, word); K])
-            }
+            |i| V::from_slice(simd, &words[i * V::LEN..][..V::LEN]),
+        ))
+    }
+    #[inline(always)]
+    fn store(self, words: &mut [i32]) {
+        let words = &mut words[..Self::LEN];
+        for (i, vector) in self.0.into_iter().enumerate() {
+            vector.store_slice(&mut words[i * V::LEN..][..V::LEN]);
+        }
+    }
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self.zip(
+            other,
             #[inline(always)]
-            fn load(simd: S, words: &[i32]) -> Self {
-                let words = &words[..Self::LEN];
-                Vectors(std::array::from_fn(
-                    #[inline(always)]
-                    |i| $vector::from_slice(simd, &words[i * <$vector<S>>::LEN..][..<$vector<S>>::LEN]),
-                ))
-            }
+            |a, b| a + b,
+        )
+    }
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self.zip(
+            other,
             #[inline(always)]
-            fn store(self, words: &mut [i32]) {
-                let words = &mut words[..Self::LEN];
-                for (i, vector) in self.0.into_iter().enumerate() {
-                    vector.store_slice(&mut words[i * <$vector<S>>::LEN..][..<$vector<S>>::LEN]);
-                }
-            }
+            |a, b| a - b,
+        )
+    }
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self.zip(
+            other,
             #[inline(always)]
-            fn add(self, other: Self) -> Self {
-                self.zip(
-                    other,
-                    #[inline(always)]
-                    |a, b| a + b,
-                )
-            }
+            |a, b| a * b,
+        )
+    }
+    #[inline(always)]
+    fn xor(self, other: Self) -> Self {
+        self.zip(
+            other,
             #[inline(always)]
-            fn sub(self, other: Self) -> Self {
-                self.zip(
-                    other,
-                    #[inline(always)]
-                    |a, b| a - b,
-                )
-            }
+            |a, b| a ^ b,
+        )
+    }
+    #[inline(always)]
+    fn or(self, other: Self) -> Self {
+        self.zip(
+            other,
             #[inline(always)]
-            fn mul(self, other: Self) -> Self {
-                self.zip(
-                    other,
-                    #[inline(always)]
-                    |a, b| a * b,
-                )
-            }
+            |a, b| a | b,
+        )
+    }
+    #[inline(always)]
+    fn shift_right(self, bits: u32) -> Self {
+        self.map(
             #[inline(always)]
-            fn xor(self, other: Self) -> Self {
-                self.zip(
-                    other,
-                    #[inline(always)]
-                    |a, b| a ^ b,
-                )
-            }
+            |a| a >> bits,
+        )
+    }
+    #[inline(always)]
+    fn shift_right_zeros(self, bits: u32) -> Self {
+        let kept = (u32::MAX >> bits) as i32;
+        self.map(
             #[inline(always)]
-            fn or(self, other: Self) -> Self {
-                self.zip(
-                    other,
-                    #[inline(always)]
-                    |a, b| a | b,
-                )
-            }
+            |a| (a >> bits) & kept,
+        )
+    }
+    #[inline(always)]
+    fn shift_left_by(self, other: Self) -> Self {
+        self.zip(
+            other,
             #[inline(always)]
-            fn shift_right(self, bits: u32) -> Self {
-                self.map(
-                    #[inline(always)]
-                    |a| a >> bits,
-                )
-            }
+            |a, b| a << (b & 31),
+        )
+    }
+    #[inline(always)]
+    fn greater(self, other: Self) -> [M; K] {
+        std::array::from_fn(
             #[inline(always)]
-            fn shift_right_zeros(self, bits: u32) -> Self {
-                let kept = (u32::MAX >> bits) as i32;
-                self.map(
-                    #[inline(always)]
-                    |a| (a >> bits) & kept,
-                )
-            }
+            |i| self.0[i].simd_gt(other.0[i]),
+        )
+    }
+    #[inline(always)]
+    fn negative(self, simd: S) -> [M; K] {
+        Self::splat(simd, 0).greater(self)
+    }
+    #[inline(always)]
+    fn less_one_where_greater(self, a: Self, b: Self) -> Self {
+        Vectors(std::array::from_fn(
             #[inline(always)]
-            fn shift_left_by(self, other: Self) -> Self {
-                self.zip(
-                    other,
-                    #[inline(always)]
-                    |a, b| a << (b & 31),
-                )
-            }
+            |i| self.0[i] + a.0[i].simd_gt(b.0[i]).to_vector(),
+        ))
+    }
+    #[inline(always)]
+    fn numbered(simd: S, bits: u64) -> Self {
+        const IOTA: [i32; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
+        let iota = V::from_slice(simd, &IOTA[..V::LEN]);
+        Vectors(std::array::from_fn(
             #[inline(always)]
-            fn greater(self, other: Self) -> [$mask<S>; K] {
-                std::array::from_fn(
-                    #[inline(always)]
-                    |i| self.0[i].simd_gt(other.0[i]),
-                )
-            }
+            |i| {
+                let shift = (i * V::LEN) as u32;
+                let before = (bits & ((1 << shift) - 1)).count_ones() as i32;
+                (iota + before).expand(M::from_bitmask(simd, bits >> shift))
+            },
+        ))
+    }
+    #[inline(always)]
+    fn select(mask: [M; K], yes: Self, no: Self) -> Self {
+        Vectors(std::array::from_fn(
             #[inline(always)]
-            fn negative(self, simd: S) -> [$mask<S>; K] {
-                Self::splat(simd, 0).greater(self)
-            }
+            |i| mask[i].select(yes.0[i], no.0[i]),
+        ))
+    }
+    #[inline(always)]
+    fn mask(simd: S, bits: u64) -> [M; K] {
+        std::array::from_fn(
             #[inline(always)]
-            fn less_one_where_greater(self, a: Self, b: Self) -> Self {
-                Vectors(std::array::from_fn(
-                    #[inline(always)]
-                    |i| self.0[i] + a.0[i].simd_gt(b.0[i]).to_vector(),
-                ))
-            }
-            #[inline(always)]
-            fn numbered(simd: S, bits: u64) -> Self {
-                const IOTA: [i32; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
-                let iota = $vector::from_slice(simd, &IOTA[..<$vector<S>>::LEN]);
-                Vectors(std::array::from_fn(
-                    #[inline(always)]
-                    |i| {
-                        let shift = (i * <$vector<S>>::LEN) as u32;
-                        let before = (bits & ((1 << shift) - 1)).count_ones() as i32;
-                        (iota + before).expand($mask::from_bitmask(simd, bits >> shift))
-                    },
-                ))
-            }
-            #[inline(always)]
-            fn select(mask: [$mask<S>; K], yes: Self, no: Self) -> Self {
-                Vectors(std::array::from_fn(
-                    #[inline(always)]
-                    |i| mask[i].select(yes.0[i], no.0[i]),
-                ))
-            }
-            #[inline(always)]
-            fn mask(simd: S, bits: u64) -> [$mask<S>; K] {
-                std::array::from_fn(
-                    #[inline(always)]
-                    |i| $mask::from_bitmask(simd, bits >> (i * <$vector<S>>::LEN)),
-                )
-            }
-            #[inline(always)]
-            fn bits(mask: [$mask<S>; K]) -> u64 {
-                let mut bits = 0;
-                for (i, mask) in mask.into_iter().enumerate() {
-                    bits |= mask.to_bitmask() << (i * <$vector<S>>::LEN);
-                }
-                bits
-            }
-            #[inline(always)]
-            fn pair(self, other: Self) -> Self::Twice {
-                Vectors(std::array::from_fn(
-                    #[inline(always)]
-                    |i| $pair(self.0[i], other.0[i]),
-                ))
-            }
-            #[inline(always)]
-            fn sum_of_halves(twice: Self::Twice) -> Self {
-                Vectors(std::array::from_fn(
-                    #[inline(always)]
-                    |i| {
-                        let (lower, upper) = $split(twice.0[i]);
-                        lower + upper
-                    },
-                ))
-            }
-        })+
-    };
-}
-
-lanes! {
-    i32x4, mask32x4, i32x8, |a: i32x4<S>, b: i32x4<S>| a.combine(b), |v: i32x8<S>| v.split();
-    i32x8, mask32x8, i32x16, |a: i32x8<S>, b: i32x8<S>| a.combine(b), |v: i32x16<S>| v.split();
-    i32x16, mask32x16, i32x16, |_, _| unreachable!("no vector is wider"),
-        |_| -> (i32x16<S>, i32x16<S>) { unreachable!("no vector is wider") };
+            |i| M::from_bitmask(simd, bits >> (i * V::LEN)),
+        )
+    }
+    #[inline(always)]
+    fn bits(mask: [M; K]) -> u64 {
+        let mut bits = 0;
+        for (i, mask) in mask.into_iter().enumerate() {
+            bits |= mask.to_bitmask() << (i * V::LEN);
+        }
+        bits
+    }
 }
 
 macro_rules! width {
@@ -298,8 +262,8 @@ width! {
 }
 
 /// Instruction sets for which kernels are compiled and that this machine has, with
-/// their names, the fastest first. The last one is plain Rust and is there everywhere. (x86 processors
-/// with SSE2 alone are old by now, and each set costs compile time.)
+/// their names, the fastest first. The last one is plain Rust and is there everywhere.
+/// (x86 processors with SSE2 alone are old by now, and each set costs compile time.)
 pub fn levels() -> Vec<(&'static str, Level)> {
     let here = Level::new();
     let mut levels = Vec::new();

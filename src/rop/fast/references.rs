@@ -19,12 +19,10 @@ pub struct Numbered<'a> {
     pub of: SampleOf<'a>,
     /// The threshold once more.
     pub limit: Limit,
-    /// What their values have in common, but for the surface.
+    /// What their values have in common if they belong to the surface before the fragment;
+    /// of the next one's first value what is made need not wait for `starts`.
     pub base: Base,
-    /// The surface before the fragment. What
-    /// is made of a surface need not wait for `starts`: it can be made of both.
-    pub before: u32,
-    /// Whether the fragment starts the next one.
+    /// Whether the fragment starts the next surface.
     pub starts: bool,
     /// The first one's number in its surface.
     pub first: u32,
@@ -32,9 +30,9 @@ pub struct Numbered<'a> {
     pub count: u32,
 }
 
-/// What the values of a pixel have in common in a round: the part of the place in a
-/// sequence that the pixel gives, its bits in reverse, and how far seed and frame move
-/// the values.
+/// What the values of a surface have in common in a round: the part of the place in a
+/// sequence that the pixel gives, its bits in reverse, and how far seed, frame and surface
+/// move the values.
 #[derive(Clone, Copy, Default, Debug)]
 pub struct Base {
     reversed: u32,
@@ -42,7 +40,8 @@ pub struct Base {
 }
 
 impl Base {
-    /// Of the pixel of this index, whose values are those from the `earlier`-th of `total`.
+    /// Of surface 0 of the pixel of this index, whose values are those from the `earlier`-th of
+    /// `total`.
     #[inline]
     pub fn of(earlier: u32, total: u32, pixel: u32, seed: u32) -> Self {
         let first = u64::from(earlier) + u64::from(pixel) * u64::from(total);
@@ -51,11 +50,16 @@ impl Base {
         Base { reversed: (first as u32).reverse_bits(), moved: scatter(seed).wrapping_add(beyond) }
     }
 
-    /// The first of the values of figure 4, for a surface.
+    /// That of a surface so many later.
     #[inline(always)]
-    pub fn first_lk2011(self, surface: u32) -> u32 {
-        let moved = surface.wrapping_add(self.moved);
-        scramble_lk2011(self.reversed.wrapping_add(moved))
+    pub fn of_surface(self, later: u32) -> Self {
+        Base { moved: self.moved.wrapping_add(later), ..self }
+    }
+
+    /// The first of the values of figure 4.
+    #[inline(always)]
+    pub fn first_lk2011(self) -> u32 {
+        scramble_lk2011(self.reversed.wrapping_add(self.moved))
     }
 }
 
@@ -152,8 +156,8 @@ fn hashed<S: Simd, L: Lanes<S>, const N: usize>(
     loaded: &Loaded<L>,
     samples: &Numbered<'_>,
 ) -> u64 {
-    let Numbered { of: SampleOf { key, round, .. }, limit, base, first, .. } = *samples;
-    let moved = key.surface.wrapping_add(base.moved);
+    let Numbered { of: SampleOf { key, round, .. }, limit, base, starts, first, .. } = *samples;
+    let moved = base.of_surface(u32::from(starts)).moved;
     let place = places(simd, loaded, base);
     let values = match reference {
         Reference::Lk2011 => lk2011(simd, place.add(L::splat(simd, moved as i32))),
@@ -167,14 +171,14 @@ fn hashed<S: Simd, L: Lanes<S>, const N: usize>(
 /// [`hashed`] for the current surface and for the next, before it is known which it will be.
 #[inline(always)]
 fn ahead<S: Simd, L: Lanes<S>>(simd: S, loaded: &Loaded<L>, samples: &Numbered<'_>) -> u64 {
-    let Numbered { limit, base, before, starts, first, .. } = *samples;
+    let Numbered { limit, base, starts, first, .. } = *samples;
     let place = places(simd, loaded, base);
-    let place = place.add(L::splat(simd, before.wrapping_add(base.moved) as i32));
-    let place = place.pair(place.add(L::splat(simd, 1)));
-    let passing = below(simd, lk2011(simd, place), limit);
+    let place = place.add(L::splat(simd, base.moved as i32));
+    let this = below(simd, lk2011(simd, place), limit);
+    let next = below(simd, lk2011(simd, place.add(L::splat(simd, 1))), limit);
     // What follows the last number of this surface is never looked at; the next one's first
     // number is 0.
-    passing.wrapping_shr(first + u32::from(starts) * L::LEN as u32)
+    (this | next << L::LEN).wrapping_shr(first + u32::from(starts) * L::LEN as u32)
 }
 
 /// The places of all numbers in a pixel's sequence: below the pixel's part are the

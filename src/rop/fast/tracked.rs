@@ -142,7 +142,7 @@ pub struct FastTracked<R, F, const N: usize> {
 pub struct Track<K, M> {
     covered: u64,
     surface: u32,
-    /// What its reference values are made of, but for surface and number, in this round.
+    /// What the surface's reference values are made of, but for the number, in this round.
     base: Base,
     pixel: PixelIndex,
     kept: K,
@@ -199,13 +199,15 @@ impl<R: Rules, F: FastReferences<N>, const N: usize> FastSampler<N> for FastTrac
         let SurfaceTracker { surface_id, numbered, last, .. } = plain.surface;
         R::keep(&mut state.more, numbered, last);
         state.covered = plain.surface.held().0;
+        state.base = state.base.of_surface(surface_id.wrapping_sub(state.surface));
         state.surface = surface_id;
         state.kept = F::of_plain(&plain.kept);
     }
 
     fn enter(&self, round: &Round, states: &mut [Self::State; TILE_PIXELS]) {
         for state in states {
-            state.base = F::base(round, state.pixel.0, round.seed);
+            let base = F::base(round, state.pixel.0, round.seed);
+            state.base = base.of_surface(state.surface);
         }
     }
 
@@ -270,17 +272,19 @@ impl<R: Rules, F: FastReferences<N>, const N: usize> FastSampler<N> for FastTrac
         let (key, base) = match prehash {
             true => {
                 let key = key.prehashed();
-                (key, F::base(round, key.pixel.0, key.seed))
+                let before = key.surface.wrapping_sub(u32::from(starts));
+                (key, F::base(round, key.pixel.0, key.seed).of_surface(before))
             }
             false => (key, p.base),
         };
         let (site, opacity) = (fragment.site(), limit.threshold());
         let of = SampleOf { site, key: &key, round: *round, opacity, first: true };
-        let samples = Numbered { of, limit, base, before: p.surface, starts, first, count };
+        let samples = Numbered { of, limit, base, starts, first, count };
         let hits = self.references.passing::<S, L, P>(simd, loaded, &mut kept, samples, tally);
 
         // 18.
         p.surface = surface;
+        p.base = p.base.of_surface(u32::from(starts));
         p.covered = held | tracked;
         p.kept = kept;
         R::keep(&mut p.more, first + count, source);

@@ -1,0 +1,146 @@
+//! What the benches share: traces that are made on the spot, and kernels on their own.
+#![allow(dead_code, reason = "no bench uses all of it")]
+
+use std::fs::File;
+use std::hint::black_box;
+use std::io::{BufWriter, Write};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use screendoor::capture::{Capture, CaptureOptions};
+use screendoor::param::Options;
+use screendoor::rop::{Engine, EventCounts, Frame, TileState, Told, Which};
+use screendoor::tile::TileId;
+use screendoor::trace::{Block, SampleMask, Trace, TraceWriter, WriteOptions};
+
+/// A square trace of a scene, in memory.
+pub fn captured(scene: &str, side: u32) -> Trace {
+    let scene = screendoor::scene::load(scene).expect("it is built in");
+    let options = CaptureOptions { width: side, height: side, ..CaptureOptions::default() };
+    let capture = Capture::new(&scene, &options).expect("the options are good");
+    capture.to_memory(|_, _| ()).expect("it is captured")
+}
+
+/// Writes a trace's fragments as `options` say.
+pub fn write<W: Write>(source: &Trace, to: W, options: WriteOptions) -> W {
+    let header = source.header().clone();
+    let mut writer = TraceWriter::new(to, "bench", header, options).expect("the header is good");
+    for batch in source.batches() {
+        for fragment in batch.expect("it reads").iter() {
+            writer.push(&fragment).expect("it writes");
+        }
+    }
+    writer.finish().expect("it writes").0
+}
+
+/// The same trace in a file, mapped.
+pub fn in_file(source: &Trace, path: &Path) -> Trace {
+    let file = BufWriter::new(File::create(path).expect("it is writable"));
+    write(source, file, WriteOptions::default()).flush().expect("it writes");
+    Trace::open(path).expect("it opens")
+}
+
+/// A tile and its fragments, in the blocks in which a replay hands them out.
+pub type Tile = (TileId, Vec<Block>);
+
+/// The touched tiles' fragments, and how many there are.
+pub fn binned(trace: &Trace, frame: &Frame) -> (Vec<Tile>, usize) {
+    let mask = SampleMask::first(frame.samples());
+    let mut tiles = vec![Vec::new(); frame.grid.count()];
+    let mut count = 0;
+    for batch in trace.batches() {
+        for mut fragment in batch.expect("it reads").iter() {
+            fragment.coverage = fragment.coverage & mask;
+            if !fragment.coverage.is_empty() {
+                tiles[frame.grid.tile(fragment.x, fragment.y).0 as usize].push(fragment);
+                count += 1;
+            }
+        }
+    }
+    let tiles = tiles.into_iter().enumerate().filter(|(_, fragments)| !fragments.is_empty());
+    let tile =
+        |(tile, fragments): (usize, Vec<_>)| (TileId(tile as u32), Block::all_of(&fragments));
+    (tiles.map(tile).collect(), count)
+}
+
+/// Which parts of an engine's work are timed.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Work {
+    /// Clearing and drawing: the kernel.
+    Draw,
+    /// The same, with events counted.
+    Count,
+    /// Clearing, drawing and resolving.
+    Picture,
+}
+
+/// Draws a tile; the time that it took. A replay has just copied a block when it is drawn:
+/// here, too, it is copied first, which is not timed.
+pub fn draw(
+    engine: &dyn Engine,
+    frame: &Frame,
+    (tile, blocks): &Tile,
+    work: Work,
+) -> (TileState, Duration) {
+    let mut events = EventCounts::default();
+    let start = Instant::now();
+    let mut state = engine.clear(frame.grid, *tile);
+    let mut time = start.elapsed();
+    let mut near = Block::default();
+    for pass in 0..engine.passes() {
+        for block in blocks {
+            near.clone_from(block);
+            let near = black_box(&near);
+            let told = match work {
+                Work::Count => Told::Counts(&mut events),
+                Work::Draw | Work::Picture => Told::Nobody,
+            };
+            let start = Instant::now();
+            engine.draw(pass, &mut state, near, told);
+            time += start.elapsed();
+        }
+        let start = Instant::now();
+        engine.end_pass(pass, frame.grid, *tile, &mut state);
+        time += start.elapsed();
+    }
+    if work == Work::Picture {
+        let start = Instant::now();
+        black_box(engine.resolve(frame.grid, *tile, &state));
+        time += start.elapsed();
+    }
+    black_box(events);
+    (state, time)
+}
+
+/// The time that all tiles take, one after the other.
+pub fn draw_all(engine: &dyn Engine, frame: &Frame, tiles: &[Tile], work: Work) -> Duration {
+    tiles.iter().map(|tile| black_box(draw(engine, frame, tile, work)).1).sum()
+}
+
+/// Panics where two engines do not agree to the last bit.
+pub fn assert_same(a: &dyn Engine, b: &dyn Engine, frame: &Frame, tiles: &[Tile]) {
+    for tile in tiles {
+        let [a, b] = [a, b].map(|engine| {
+            let (state, _) = draw(engine, frame, tile, Work::Draw);
+            engine.resolve(frame.grid, tile.0, &state).map(|colour| colour.map(f64::to_bits))
+        });
+        assert_eq!(a, b, "engines differ in {:?}", tile.0);
+    }
+}
+
+/// The engines that this machine can run, but for the portable one, which is slower than the
+/// reference.
+pub fn engines() -> impl Iterator<Item = (&'static str, Which)> {
+    let all = Which::CHOICES.iter().zip(Which::ALL).map(|(choice, which)| (choice.name, *which));
+    all.filter(|(_, which)| which.level().is_ok() && *which != Which::Portable)
+}
+
+/// What is read when the machine's memory is measured: more than the caches hold.
+pub fn stream() -> Vec<u64> {
+    vec![1; 1 << 25]
+}
+
+/// Reads all of it, at the rate that memory gives.
+pub fn sum(words: &[u64]) -> u64 {
+    black_box(words).iter().fold(0, |sum, word| sum.wrapping_add(*word))
+}

@@ -1,0 +1,204 @@
+//! The table of `docs/PERFORMANCE.md`: how near the replay comes to the machine's limits.
+//!
+//! `cargo bench --bench limits` prints it as Markdown, in about a minute; with `-- --large`
+//! a trace of 10^8 fragments is written (3.3 GB, beside the build) and replayed, too.
+//!
+//! Machines are shared and change their speed while one looks. So every row is a ratio, its
+//! two sides measured one right after the other, and that again and again: what is shown is
+//! the median and the quartiles of the ratios.
+
+mod common;
+
+use std::fs::File;
+use std::hint::black_box;
+use std::io::{BufWriter, Write};
+use std::path::Path;
+use std::time::Instant;
+
+use common::{Tile, Work, assert_same, binned, captured, draw_all, in_file};
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use screendoor::capture::{Capture, CaptureOptions};
+use screendoor::design::{Configured, REFERENCE, configure};
+use screendoor::rop::{Engine, Frame, ReplayOptions, Which};
+use screendoor::tile::TILE_PIXELS;
+use screendoor::trace::{Trace, TraceWriter, WriteOptions};
+
+const ROUNDS: usize = 9;
+
+/// A row of the table.
+struct Row {
+    what: &'static str,
+    least: f64,
+    aim: f64,
+    unit: &'static str,
+    /// Whether the figure is a cost.
+    lower: bool,
+    found: Vec<f64>,
+}
+
+impl Row {
+    fn print(mut self) {
+        let Row { what, least, aim, unit, lower, .. } = self;
+        self.found.sort_by(f64::total_cmp);
+        let at = |share: f64| self.found[((self.found.len() - 1) as f64 * share).round() as usize];
+        let [low, median, high] = [0.25, 0.5, 0.75].map(at);
+        let held = |limit: f64| if lower { median <= limit } else { median >= limit };
+        let verdict = match (held(aim), held(least)) {
+            (true, _) => "aim reached",
+            (false, true) => "held",
+            (false, false) => "missed",
+        };
+        println!(
+            "| {what} | {least}{unit} | {aim}{unit} | {median:.2}{unit} ({low:.2} to {high:.2}) | {verdict} |"
+        );
+    }
+}
+
+/// A row of a figure that should be high, measured in every round.
+fn high(what: &'static str, least: f64, aim: f64, unit: &'static str, found: Vec<f64>) -> Row {
+    Row { what, least, aim, unit, lower: false, found }
+}
+
+/// A row of a cost.
+fn low(what: &'static str, least: f64, aim: f64, found: Vec<f64>) -> Row {
+    Row { what, least, aim, unit: "×", lower: true, found }
+}
+
+/// An engine and what it draws.
+struct Kernel {
+    engine: Box<dyn Engine>,
+    frame: Frame,
+    tiles: Vec<Tile>,
+    fragments: usize,
+}
+
+impl Kernel {
+    fn new(trace: &Trace, name: &str, samples: u32, which: Which) -> Self {
+        let design = design(name);
+        let frame = design.frame(trace, samples, 1).expect("it has the samples");
+        let build = |which| design.build(&frame, which).expect("it is built");
+        let (engine, reference) = (build(which), build(Which::Reference));
+        let (tiles, fragments) = binned(trace, &frame);
+        assert_same(&*engine, &*reference, &frame, &tiles);
+        Kernel { engine, frame, tiles, fragments }
+    }
+
+    /// Seconds.
+    fn time(&self, work: Work) -> f64 {
+        draw_all(&*self.engine, &self.frame, &self.tiles, work).as_secs_f64()
+    }
+
+    /// Bytes of the touched tiles' state, as far as a design counts them.
+    fn state_bytes(&self) -> f64 {
+        let bits = self.engine.state_bits().total();
+        (self.tiles.len() * TILE_PIXELS) as f64 * f64::from(bits) / 8.0
+    }
+}
+
+fn design(name: &str) -> Configured {
+    configure(name, &[]).expect("defaults are good")
+}
+
+fn seconds(work: impl FnOnce()) -> f64 {
+    let start = Instant::now();
+    work();
+    start.elapsed().as_secs_f64()
+}
+
+fn pool(threads: usize) -> ThreadPool {
+    ThreadPoolBuilder::new().num_threads(threads).build().expect("threads")
+}
+
+/// Seconds of a whole replay through `lk` at 8 samples.
+fn replay(trace: &Trace, pool: &ThreadPool) -> f64 {
+    let design = design("lk");
+    let options = ReplayOptions::default();
+    let run = || design.replay(trace, 8, 1, &options).expect("it replays");
+    seconds(|| drop(black_box(pool.install(run))))
+}
+
+/// So many layers over each of 1024 × 1024 pixels, in a file.
+fn layers(folder: &Path, count: u32) -> Trace {
+    let path = folder.join(format!("layers-{count}.arrow"));
+    let scene = format!("builtin:layers:count={count},alpha=0.1,coloured=true");
+    let scene = screendoor::scene::load(&scene).expect("it is built in");
+    let (width, height, samples) = (1024, 1024, 8);
+    let options = CaptureOptions { width, height, samples, ..CaptureOptions::default() };
+    let capture = Capture::new(&scene, &options).expect("the options are good");
+    let file = BufWriter::new(File::create(&path).expect("it is writable"));
+    let header = capture.header().clone();
+    let mut writer = TraceWriter::new(file, "layers", header, WriteOptions::default())
+        .expect("the header is good");
+    capture.draw(&mut writer, |_, _| ()).expect("it is drawn");
+    writer.finish().expect("it writes").0.flush().expect("it writes");
+    Trace::open(&path).expect("it opens")
+}
+
+fn main() {
+    let large = std::env::args().any(|argument| argument == "--large");
+    let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("there is room");
+    let memory = captured("builtin:engine", 512);
+    let trace = in_file(&memory, &folder.path().join("engine.arrow"));
+    let kernel = |name, samples, which| Kernel::new(&memory, name, samples, which);
+    let lk = kernel("lk", 8, Which::Fast);
+    let lk_reference = kernel("lk", 8, Which::Reference);
+    let lk_64 = kernel("lk", 64, Which::Fast);
+    let systematic = kernel("systematic", 8, Which::Fast);
+    let exact = kernel(REFERENCE, 8, Which::Fast);
+    let exact_reference = kernel(REFERENCE, 8, Which::Reference);
+    let words = common::stream();
+    let (one, two) = (pool(1), pool(2));
+    let bytes = trace_bytes(folder.path()) + 2.0 * lk.state_bytes();
+
+    let mut found: [Vec<f64>; 9] = Default::default();
+    for _ in 0..ROUNDS {
+        let time = lk.time(Work::Draw);
+        let whole = replay(&trace, &one);
+        let streamed = size_of_val(&words[..]) as f64
+            / seconds(|| {
+                black_box(common::sum(&words));
+            });
+        let per_sample =
+            |kernel: &Kernel, time: f64, samples: usize| time / (kernel.fragments * samples) as f64;
+        let round = [
+            lk_reference.time(Work::Draw) / time,
+            lk.time(Work::Draw) / systematic.time(Work::Draw),
+            lk.fragments as f64 / time / 1e6,
+            100.0 * time / whole,
+            100.0 * bytes / whole / streamed,
+            replay(&trace, &one) / replay(&trace, &two),
+            per_sample(&lk_64, lk_64.time(Work::Draw), 64) / per_sample(&lk, time, 8),
+            exact_reference.time(Work::Picture) / exact.time(Work::Picture),
+            lk.time(Work::Count) / lk.time(Work::Draw),
+        ];
+        for (list, figure) in found.iter_mut().zip(round) {
+            list.push(figure);
+        }
+    }
+    let [kernel, even, rate, share, moved, threads, per_sample, sorted, counted] = found;
+    println!("| what | at least | aim | median (quartiles) | |");
+    println!("|---|---|---|---|---|");
+    let rows = [
+        high("`lk`, 8 samples, kernel, one core: fast ÷ reference", 8.0, 20.0, "×", kernel),
+        high("`systematic`, 8 samples, kernel ÷ `lk` kernel", 1.3, 2.0, "×", even),
+        high("million fragments/s per core, `lk`, 8 samples, kernel", 50.0, 100.0, "", rate),
+        high("whole replay, one thread: share of the kernel's rate", 60.0, 85.0, " %", share),
+        high("bytes of file and state per second ÷ streaming", 30.0, 70.0, " %", moved),
+        high("two threads ÷ one", 1.8, 1.95, "×", threads),
+        low("time per sample at 64 samples ÷ at 8", 1.5, 1.0, per_sample),
+        high("`exact` ÷ a per-pixel `Vec`, standard sort", 3.0, 6.0, "×", sorted),
+        low("counting events: on ÷ off", 1.1, 1.0, counted),
+    ];
+    rows.into_iter().for_each(Row::print);
+    if large {
+        let (short, long) = (layers(folder.path(), 1), layers(folder.path(), 100));
+        let per_fragment = |trace: &Trace| replay(trace, &two) / trace.rows() as f64;
+        let found = (0..3).map(|_| per_fragment(&long) / per_fragment(&short)).collect();
+        low("time per fragment at 10^8 fragments ÷ at 10^6", 1.1, 1.0, found).print();
+    }
+}
+
+fn trace_bytes(folder: &Path) -> f64 {
+    let file = std::fs::metadata(folder.join("engine.arrow")).expect("it has been written");
+    file.len() as f64
+}
