@@ -35,7 +35,9 @@ pub fn write<W: Write>(source: &Trace, to: W, options: WriteOptions) -> W {
 
 /// The same trace in a file, mapped.
 pub fn in_file(source: &Trace, path: &Path) -> Trace {
-    let file = BufWriter::new(File::create(path).expect("it is writable"));
+    let file = File::create(path).expect("it is writable");
+    // Large writes make large folios of the page cache, which are mapped sooner.
+    let file = BufWriter::with_capacity(1 << 20, file);
     write(source, file, WriteOptions::default()).flush().expect("it writes");
     Trace::open(path).expect("it opens")
 }

@@ -149,6 +149,18 @@ where
     pub(super) sampler: F,
     pub(super) constants: Constants<Count<N>>,
     level: Level,
+    #[cfg(test)]
+    pub(super) flaw: Option<Flaw>,
+}
+
+/// A defect of one bit in one lane, for the test that finds it.
+#[cfg(test)]
+#[derive(Clone, Copy, Debug)]
+pub enum Flaw {
+    /// In the depth that is stored.
+    Depth(usize),
+    /// In the choice of the samples that are written.
+    Choice(usize),
 }
 
 impl<F: FastSampler<N>, const N: usize> FastEngine<F, N>
@@ -159,7 +171,20 @@ where
     /// the instructions of `level`.
     pub fn new(plain: Stochastic<F::Plain, N>, sampler: F, level: Level) -> Self {
         let constants = Constants::of(&plain.inner.frame);
-        FastEngine { plain, sampler, constants, level }
+        FastEngine {
+            plain,
+            sampler,
+            constants,
+            level,
+            #[cfg(test)]
+            flaw: None,
+        }
+    }
+
+    /// The same with a defect.
+    #[cfg(test)]
+    pub fn with_flaw(self, flaw: Flaw) -> Self {
+        FastEngine { flaw: Some(flaw), ..self }
     }
 
     /// Draws a fragment as the plain text does.

@@ -4,6 +4,8 @@ use fearless_simd::Simd;
 
 use crate::rop::design::Frame;
 use crate::rop::event::Probe;
+#[cfg(test)]
+use crate::rop::fast::engine::Flaw;
 use crate::rop::fast::engine::{FastEngine, FastSampler, Loaded, Offered, Row};
 use crate::rop::fast::lanes::{Count, Lanes, Width};
 use crate::rop::fast::references::Limit;
@@ -153,6 +155,8 @@ pub(super) fn draw_samples<S: Simd, F: FastSampler<N>, P: Probe, const N: usize>
         };
         let state = &mut tile.states[within];
         let written = sampler.choose(simd, &loaded, state, offered, &mut tally);
+        #[cfg(test)]
+        let (z, written) = flawed(simd, engine.flaw, z, written, passed);
         let depth = LanesOf::<S, N>::select(written, z, stored);
         depth.store(held.depth.as_mut());
         for (row, channel) in held.colour.iter_mut().zip(&block.colour) {
@@ -171,6 +175,26 @@ pub(super) fn draw_samples<S: Simd, F: FastSampler<N>, P: Probe, const N: usize>
     if P::LISTENS {
         let state_bits = methods.sampler.state_bits();
         probe.many(&tally.events(depth_bits, methods.sample_bits(), state_bits));
+    }
+}
+
+/// What is written, with the lane's defect.
+#[cfg(test)]
+fn flawed<S: Simd, L: Lanes<S>>(
+    simd: S,
+    flaw: Option<Flaw>,
+    z: L,
+    written: L::Mask,
+    passed: u64,
+) -> (L, L::Mask) {
+    match flaw {
+        Some(Flaw::Depth(lane)) => {
+            let mut bit = [0; MAX_SAMPLES as usize];
+            bit[lane] = 1;
+            (z.xor(L::load(simd, &bit[..L::LEN])), written)
+        }
+        Some(Flaw::Choice(lane)) => (z, L::mask(simd, L::bits(written) ^ (1 << lane & passed))),
+        None => (z, written),
     }
 }
 

@@ -17,6 +17,8 @@ mod state;
 mod tally;
 mod tracked;
 
+#[cfg(test)]
+pub use engine::Flaw;
 pub use engine::{FastEngine, FastSampler, Loaded, Offered, Row};
 pub use lanes::{Count, Lanes, Width, levels};
 pub use rank::{in_sample_order, picked, ranks, ranks_of_any, ranks_of_distinct};
