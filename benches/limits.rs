@@ -23,6 +23,7 @@ use screendoor::rop::{Engine, Frame, ReplayOptions, Which};
 use screendoor::tile::TILE_PIXELS;
 use screendoor::trace::{Trace, TraceWriter, WriteOptions};
 
+/// Measurements of every row; with `--test`, one.
 const ROUNDS: usize = 9;
 
 /// A row of the table.
@@ -135,7 +136,8 @@ fn layers(folder: &Path, count: u32) -> Trace {
 }
 
 fn main() {
-    let large = std::env::args().any(|argument| argument == "--large");
+    let asked = |wanted: &str| std::env::args().any(|argument| argument == wanted);
+    let rounds = if asked("--test") { 1 } else { ROUNDS };
     let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("there is room");
     let memory = captured("builtin:engine", 512);
     let trace = in_file(&memory, &folder.path().join("engine.arrow"));
@@ -151,7 +153,7 @@ fn main() {
     let bytes = trace_bytes(folder.path()) + 2.0 * lk.state_bytes();
 
     let mut found: [Vec<f64>; 9] = Default::default();
-    for _ in 0..ROUNDS {
+    for _ in 0..rounds {
         let time = lk.time(Work::Draw);
         let whole = replay(&trace, &one);
         let streamed = size_of_val(&words[..]) as f64
@@ -190,7 +192,7 @@ fn main() {
         low("counting events: on ÷ off", 1.1, 1.0, counted),
     ];
     rows.into_iter().for_each(Row::print);
-    if large {
+    if asked("--large") {
         let (short, long) = (layers(folder.path(), 1), layers(folder.path(), 100));
         let per_fragment = |trace: &Trace| replay(trace, &two) / trace.rows() as f64;
         let found = (0..3).map(|_| per_fragment(&long) / per_fragment(&short)).collect();

@@ -58,7 +58,8 @@ impl Storage {
             Storage::File(_) if length == 0 => Ok(Bytes::new()),
             Storage::File(file) => {
                 let mut options = MmapOptions::new();
-                options.offset(offset).len(length);
+                // All of it is about to be read: mapped at once, its pages cost no faults.
+                options.offset(offset).len(length).populate();
                 // SAFETY: the map is read-only. Another process that changes the file
                 // could change bytes behind the slice; the type's documentation
                 // forbids that, as there is no way to prevent it.

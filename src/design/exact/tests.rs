@@ -1,28 +1,15 @@
 //! The fast engine and the plain text give the same bits.
 
-use fearless_simd::Level;
-
 use crate::design::exact::fast::Fast;
 use crate::design::{REFERENCE, configure};
 use crate::random::Stream;
+use crate::rop::fast::levels;
 use crate::rop::{Engine, EventCounts, Frame, TileState, Told, Which};
 use crate::tile::{TILE_PIXELS, TileGrid, TileId};
 use crate::trace::{Block, DepthPlane, Fragment, SampleMask, Unorm32};
 
 const SAMPLES: [u32; 7] = [1, 2, 4, 8, 16, 32, 64];
 const TILE: TileId = TileId(0);
-
-/// All that this machine can run.
-fn levels() -> Vec<Level> {
-    let best = Level::new();
-    let mut levels = vec![best, Level::baseline()];
-    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-    {
-        levels.extend(best.as_avx2().map(Level::Avx2));
-        levels.extend(best.as_sse4_2().map(Level::Sse4_2));
-    }
-    levels
-}
 
 fn frame(samples: u32, random: &mut Stream) -> Frame {
     let mut offset = || random.below(16) as i8 - 8;
@@ -137,7 +124,7 @@ fn assert_same(frame: &Frame, fragments: &[Fragment], what: &str) {
     let reference_engine = reference(frame);
     let (state, counts) = drawn(&*reference_engine, frame, fragments);
     let expected = reference_engine.resolve(frame.grid, TILE, &state);
-    for level in levels() {
+    for (_, level) in levels() {
         let fast = Fast::new(frame, reference(frame), level);
         let (fast_state, fast_counts) = drawn(&fast, frame, fragments);
         assert_eq!(fast_counts, counts, "{what}");

@@ -19,8 +19,8 @@ pub struct Numbered<'a> {
     pub of: SampleOf<'a>,
     /// The threshold once more.
     pub limit: Limit,
-    /// What their values have in common if they belong to the surface before the fragment;
-    /// of the next one's first value what is made need not wait for `starts`.
+    /// What their values have in common if they belong to the surface before the fragment:
+    /// what is made of this, and of the next surface's, need not wait for `starts`.
     pub base: Base,
     /// Whether the fragment starts the next surface.
     pub starts: bool,

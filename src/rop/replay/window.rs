@@ -18,9 +18,9 @@ use crate::rop::replay::unit::{Part, Sorter, Unit};
 use crate::tile::{TileId, TileMap};
 use crate::trace::{Block, SampleMask, Trace};
 
-/// Fragments of a window for each thread: two windows' worth are held, decoded, and
-/// what stays in the nearer caches between sorting and drawing is worth more than
-/// visiting a tile less often.
+/// Fragments of a window for each thread. With more, tiles are visited less often, but the
+/// columns have left the nearer caches when they are copied: it comes to the same, and two
+/// windows' batches are held.
 const ROWS_PER_THREAD: usize = 1 << 15;
 /// Fragments of a window, at most, however many threads there are: bounds the memory.
 const WINDOW_ROWS: usize = 1 << 19;
