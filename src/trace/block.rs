@@ -179,92 +179,27 @@ impl Block {
     #[inline(always)]
     fn put(&mut self, batch: &Batch, list: &[Stretch], mask: SampleMask) {
         let from = Stretches { at: self.len, list };
-        from.put(
-            &batch.x,
-            &mut self.x,
-            #[inline(always)]
-            |v| v,
-        );
-        from.put(
-            &batch.y,
-            &mut self.y,
-            #[inline(always)]
-            |v| v,
-        );
+        from.put(&batch.x, &mut self.x, same);
+        from.put(&batch.y, &mut self.y, same);
         let coverage = &mut self.coverage;
         match &batch.coverage {
-            CoverageColumn::U8(c) => from.put(
-                c,
-                coverage,
-                #[inline(always)]
-                |v| u64::from(v) & mask.0,
-            ),
-            CoverageColumn::U16(c) => from.put(
-                c,
-                coverage,
-                #[inline(always)]
-                |v| u64::from(v) & mask.0,
-            ),
-            CoverageColumn::U32(c) => from.put(
-                c,
-                coverage,
-                #[inline(always)]
-                |v| u64::from(v) & mask.0,
-            ),
-            CoverageColumn::U64(c) => from.put(
-                c,
-                coverage,
-                #[inline(always)]
-                |v| v & mask.0,
-            ),
+            CoverageColumn::U8(c) => from.put_masks(c, coverage, mask),
+            CoverageColumn::U16(c) => from.put_masks(c, coverage, mask),
+            CoverageColumn::U32(c) => from.put_masks(c, coverage, mask),
+            CoverageColumn::U64(c) => from.put_masks(c, coverage, mask),
         }
-        from.put(
-            &batch.z,
-            &mut self.z,
-            #[inline(always)]
-            |v| v,
-        );
-        from.put(
-            &batch.dzdx,
-            &mut self.dzdx,
-            #[inline(always)]
-            |v| v,
-        );
-        from.put(
-            &batch.dzdy,
-            &mut self.dzdy,
-            #[inline(always)]
-            |v| v,
-        );
+        from.put(&batch.z, &mut self.z, same);
+        from.put(&batch.dzdx, &mut self.dzdx, same);
+        from.put(&batch.dzdy, &mut self.dzdy, same);
         for (values, column) in self.colour.iter_mut().zip(&batch.colour) {
             match column {
                 ChannelColumn::F16(c) => from.put(c, values, widen),
-                ChannelColumn::F32(c) => from.put(
-                    c,
-                    values,
-                    #[inline(always)]
-                    |v| v,
-                ),
+                ChannelColumn::F32(c) => from.put(c, values, same),
             }
         }
-        from.put(
-            &batch.alpha,
-            &mut self.alpha,
-            #[inline(always)]
-            |v| v,
-        );
-        from.put(
-            &batch.primitive,
-            &mut self.primitive,
-            #[inline(always)]
-            |v| v,
-        );
-        from.put(
-            &batch.object,
-            &mut self.object,
-            #[inline(always)]
-            |v| v,
-        );
+        from.put(&batch.alpha, &mut self.alpha, same);
+        from.put(&batch.primitive, &mut self.primitive, same);
+        from.put(&batch.object, &mut self.object, same);
     }
 }
 
@@ -276,6 +211,22 @@ struct Stretches<'a> {
 }
 
 impl Stretches<'_> {
+    /// Copies masks, as far as they lie within another.
+    #[inline(always)]
+    fn put_masks<T: Native + Into<u64>>(
+        self,
+        column: &Column<T>,
+        to: &mut Values<u64>,
+        mask: SampleMask,
+    ) {
+        self.put(
+            column,
+            to,
+            #[inline(always)]
+            |v| v.into() & mask.0,
+        );
+    }
+
     /// Copies a column's values. A whole stretch's worth is copied for each, however short
     /// it is, and what is too much is written over by the next: a length known when this
     /// is compiled is worth more than a copy that ends where it should.
@@ -316,6 +267,13 @@ impl Stretches<'_> {
         }
     }
 }
+
+/// For columns that are copied as they are.
+#[inline(always)]
+fn same<T>(value: T) -> T {
+    value
+}
+
 /// A finite half-precision value in single precision, exactly. The multiplication by
 /// 2^112 moves one format's exponents, denormals included, to the other's; unlike
 /// `f16::to_f32` it asks for no instruction that a machine may lack.
@@ -329,12 +287,100 @@ fn widen(value: f16) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+
     use super::*;
+    use crate::random::Stream;
+    use crate::trace::batch::BatchBuilder;
+    use crate::trace::{ColourFormat, ColumnId, Header, SamplePattern, Scalar};
 
     #[test]
     fn every_finite_half_is_widened_exactly() {
         for value in (0..=u16::MAX).map(f16::from_bits).filter(|v| v.is_finite()) {
             assert_eq!(widen(value).to_bits(), value.to_f32().to_bits(), "{value}");
+        }
+    }
+
+    /// A batch of random fragments, with columns of all types: masks for so many samples,
+    /// colours in either precision, and two constants or none.
+    fn batch(random: &mut Stream, samples: u32, colour: ColourFormat, constants: bool) -> Batch {
+        let mut header = Header {
+            width: 1 << 16,
+            height: 1 << 16,
+            pattern: SamplePattern {
+                name: String::new(),
+                positions: vec![[0, 0]; samples as usize],
+                nested: false,
+            },
+            background: [0.0; 3],
+            colour,
+            source: String::new(),
+            camera: String::new(),
+            constants: BTreeMap::new(),
+        };
+        if constants {
+            header.constants.insert(ColumnId::X, Scalar::Unsigned(7));
+            header.constants.insert(ColumnId::Alpha, Scalar::Real(0.25));
+        }
+        let mut builder = BatchBuilder::new(&header).unwrap();
+        for _ in 0..100 {
+            let bits = u64::from(random.word()) << 32 | u64::from(random.word());
+            let fragment = Fragment {
+                x: if constants { 7 } else { random.word() as u16 },
+                y: random.word() as u16,
+                coverage: SampleMask(bits) & SampleMask::first(samples),
+                depth: DepthPlane {
+                    z: Unorm32(random.word()),
+                    dzdx: random.word() as i32,
+                    dzdy: random.word() as i32,
+                },
+                colour: [random.unit(), -random.unit(), random.unit() * 1000.0],
+                alpha: if constants { 0.25 } else { random.unit() },
+                primitive: random.word(),
+                object: random.word(),
+            };
+            builder.push(&fragment).unwrap();
+        }
+        builder.take()
+    }
+
+    /// Stretches of all lengths, in any order, the batch's last row among them, until the
+    /// block is full.
+    #[test]
+    fn stretches_are_gathered_whole_and_in_order() {
+        let mut random = Stream::new([3]);
+        for samples in [1, 8, 16, 32, 64] {
+            for colour in [ColourFormat::F16, ColourFormat::F32] {
+                for (constants, level) in
+                    [(false, Level::new()), (true, Level::new()), (false, Level::fallback())]
+                {
+                    let batch = batch(&mut random, samples, colour, constants);
+                    let mask = SampleMask::first(samples.div_ceil(2));
+                    let stretch = |_| {
+                        let count = 1 + random.below(STRETCH as u32) as usize;
+                        let start = random.below(batch.len() as u32 - count as u32 + 1) as usize;
+                        Stretch::new(start.max(batch.len() - 30 - count), count)
+                    };
+                    let stretches: Vec<Stretch> = (0..60).map(stretch).collect();
+                    let mut block = Block::default();
+                    let first = block.gather(level, &batch, &stretches[..3], mask);
+                    let more = block.gather(level, &batch, &stretches[3..], mask);
+                    let (taken, left) = stretches.split_at(first + more);
+                    assert!(first == 3 && block.rows() + left[0].count() > BLOCK);
+                    let rows = taken.iter().flat_map(|s| s.start()..s.start() + s.count());
+                    let expected: Vec<Fragment> = rows
+                        .map(|row| {
+                            let fragment = batch.fragment(row);
+                            Fragment { coverage: fragment.coverage & mask, ..fragment }
+                        })
+                        .collect();
+                    let found: Vec<Fragment> =
+                        (0..block.rows()).map(|i| block.fragment(i)).collect();
+                    assert_eq!(found, expected);
+                    let covered = expected.iter().filter(|f| !f.coverage.is_empty());
+                    assert!(block.iter().eq(covered.copied()));
+                }
+            }
         }
     }
 }

@@ -23,7 +23,7 @@ pub trait Engine: Send + Sync {
     fn bytes_per_fragment(&self) -> Option<usize>;
     /// A cleared tile.
     fn clear(&self, grid: TileGrid, tile: TileId) -> TileState;
-    /// Draws fragments of one tile, in this order.
+    /// Draws fragments of one tile, in this order; rows that cover nothing are none.
     fn draw(&self, pass: u32, state: &mut TileState, fragments: &Block, told: Told<'_>);
     /// Ends a pass for a tile.
     fn end_pass(&self, pass: u32, grid: TileGrid, tile: TileId, state: &mut TileState);
