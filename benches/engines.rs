@@ -11,6 +11,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use rayon::ThreadPoolBuilder;
 use screendoor::design::{REFERENCE, configure};
 use screendoor::rop::{ReplayOptions, Which};
+use screendoor::trace::WriteOptions;
 
 const SCENE: &str = "builtin:engine";
 const SIDE: u32 = 512;
@@ -42,7 +43,10 @@ fn bench(c: &mut Criterion, name: &str, counts: &[u32], works: &[(&str, Work)]) 
 /// From the mapped file to the picture.
 fn replay(c: &mut Criterion) {
     let folder = tempfile::tempdir().expect("there is room");
-    let trace = in_file(&captured(SCENE, SIDE), &folder.path().join("engine.arrow"));
+    let memory = captured(SCENE, SIDE);
+    let trace = in_file(&folder.path().join("engine.arrow"), |file| {
+        common::write(&memory, file, WriteOptions::default())
+    });
     let mut group = c.benchmark_group("replay/lk/8");
     group.throughput(Throughput::Elements(trace.rows()));
     let design = configure("lk", &[]).expect("defaults are good");

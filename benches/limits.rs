@@ -1,6 +1,6 @@
 //! The table of `docs/PERFORMANCE.md`: how near the replay comes to the machine's limits.
 //!
-//! `cargo bench --bench limits` prints it as Markdown, in about a minute; with `-- --large`
+//! `cargo bench --bench limits` prints it as Markdown, in a quarter of a minute; with `-- --large`
 //! a trace of 10^8 fragments is written (3.3 GB, beside the build) and replayed, too.
 //!
 //! Machines are shared and change their speed while one looks. So every row is a ratio, its
@@ -9,9 +9,7 @@
 
 mod common;
 
-use std::fs::File;
 use std::hint::black_box;
-use std::io::{BufWriter, Write};
 use std::path::Path;
 use std::time::Instant;
 
@@ -65,33 +63,39 @@ fn low(what: &'static str, least: f64, aim: f64, found: Vec<f64>) -> Row {
     Row { what, least, aim, unit: "×", lower: true, found }
 }
 
-/// An engine and what it draws.
+/// A design's engines and what they draw.
 struct Kernel {
-    engine: Box<dyn Engine>,
+    fast: Box<dyn Engine>,
+    reference: Box<dyn Engine>,
     frame: Frame,
     tiles: Vec<Tile>,
     fragments: usize,
 }
 
 impl Kernel {
-    fn new(trace: &Trace, name: &str, samples: u32, which: Which) -> Self {
+    fn new(trace: &Trace, name: &str, samples: u32) -> Self {
         let design = design(name);
         let frame = design.frame(trace, samples, 1).expect("it has the samples");
         let build = |which| design.build(&frame, which).expect("it is built");
-        let (engine, reference) = (build(which), build(Which::Reference));
+        let (fast, reference) = (build(Which::Fast), build(Which::Reference));
         let (tiles, fragments) = binned(trace, &frame);
-        assert_same(&*engine, &*reference, &frame, &tiles);
-        Kernel { engine, frame, tiles, fragments }
+        assert_same(&*fast, &*reference, &frame, &tiles);
+        Kernel { fast, reference, frame, tiles, fragments }
     }
 
-    /// Seconds.
+    /// Seconds of the fast engine.
     fn time(&self, work: Work) -> f64 {
-        draw_all(&*self.engine, &self.frame, &self.tiles, work).as_secs_f64()
+        draw_all(&*self.fast, &self.frame, &self.tiles, work).as_secs_f64()
+    }
+
+    /// Seconds of the plain text.
+    fn reference_time(&self, work: Work) -> f64 {
+        draw_all(&*self.reference, &self.frame, &self.tiles, work).as_secs_f64()
     }
 
     /// Bytes of the touched tiles' state, as far as a design counts them.
     fn state_bytes(&self) -> f64 {
-        let bits = self.engine.state_bits().total();
+        let bits = self.fast.state_bits().total();
         (self.tiles.len() * TILE_PIXELS) as f64 * f64::from(bits) / 8.0
     }
 }
@@ -126,13 +130,13 @@ fn layers(folder: &Path, count: u32) -> Trace {
     let (width, height, samples) = (1024, 1024, 8);
     let options = CaptureOptions { width, height, samples, ..CaptureOptions::default() };
     let capture = Capture::new(&scene, &options).expect("the options are good");
-    let file = BufWriter::new(File::create(&path).expect("it is writable"));
-    let header = capture.header().clone();
-    let mut writer = TraceWriter::new(file, "layers", header, WriteOptions::default())
-        .expect("the header is good");
-    capture.draw(&mut writer, |_, _| ()).expect("it is drawn");
-    writer.finish().expect("it writes").0.flush().expect("it writes");
-    Trace::open(&path).expect("it opens")
+    in_file(&path, |file| {
+        let header = capture.header().clone();
+        let mut writer = TraceWriter::new(file, "layers", header, WriteOptions::default())
+            .expect("the header is good");
+        capture.draw(&mut writer, |_, _| ()).expect("it is drawn");
+        writer.finish().expect("it writes").0
+    })
 }
 
 fn main() {
@@ -140,17 +144,15 @@ fn main() {
     let rounds = if asked("--test") { 1 } else { ROUNDS };
     let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).expect("there is room");
     let memory = captured("builtin:engine", 512);
-    let trace = in_file(&memory, &folder.path().join("engine.arrow"));
-    let kernel = |name, samples, which| Kernel::new(&memory, name, samples, which);
-    let lk = kernel("lk", 8, Which::Fast);
-    let lk_reference = kernel("lk", 8, Which::Reference);
-    let lk_64 = kernel("lk", 64, Which::Fast);
-    let systematic = kernel("systematic", 8, Which::Fast);
-    let exact = kernel(REFERENCE, 8, Which::Fast);
-    let exact_reference = kernel(REFERENCE, 8, Which::Reference);
+    let path = folder.path().join("engine.arrow");
+    let trace = in_file(&path, |file| common::write(&memory, file, WriteOptions::default()));
+    let kernel = |name, samples| Kernel::new(&memory, name, samples);
+    let (lk, lk_64) = (kernel("lk", 8), kernel("lk", 64));
+    let (systematic, exact) = (kernel("systematic", 8), kernel(REFERENCE, 8));
     let words = common::stream();
     let (one, two) = (pool(1), pool(2));
-    let bytes = trace_bytes(folder.path()) + 2.0 * lk.state_bytes();
+    let file = std::fs::metadata(&path).expect("it has been written").len();
+    let bytes = file as f64 + 2.0 * lk.state_bytes();
 
     let mut found: [Vec<f64>; 9] = Default::default();
     for _ in 0..rounds {
@@ -163,14 +165,14 @@ fn main() {
         let per_sample =
             |kernel: &Kernel, time: f64, samples: usize| time / (kernel.fragments * samples) as f64;
         let round = [
-            lk_reference.time(Work::Draw) / time,
+            lk.reference_time(Work::Draw) / time,
             lk.time(Work::Draw) / systematic.time(Work::Draw),
             lk.fragments as f64 / time / 1e6,
             100.0 * time / whole,
             100.0 * bytes / whole / streamed,
             replay(&trace, &one) / replay(&trace, &two),
             per_sample(&lk_64, lk_64.time(Work::Draw), 64) / per_sample(&lk, time, 8),
-            exact_reference.time(Work::Picture) / exact.time(Work::Picture),
+            exact.reference_time(Work::Picture) / exact.time(Work::Picture),
             lk.time(Work::Count) / lk.time(Work::Draw),
         ];
         for (list, figure) in found.iter_mut().zip(round) {
@@ -198,9 +200,4 @@ fn main() {
         let found = (0..3).map(|_| per_fragment(&long) / per_fragment(&short)).collect();
         low("time per fragment at 10^8 fragments ÷ at 10^6", 1.1, 1.0, found).print();
     }
-}
-
-fn trace_bytes(folder: &Path) -> f64 {
-    let file = std::fs::metadata(folder.join("engine.arrow")).expect("it has been written");
-    file.len() as f64
 }

@@ -8,7 +8,7 @@ mod common;
 
 use std::hint::black_box;
 
-use common::captured;
+use common::{COMPRESSIONS, captured, stored};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
@@ -17,14 +17,12 @@ use screendoor::rop::{
     Contents, Engine, Frame, ReplayOptions, Replayed, StateBits, TileState, Told, replay,
 };
 use screendoor::tile::{TILE_PIXELS, TileGrid, TileId};
-use screendoor::trace::{Block, Compression, Trace, WriteOptions};
+use screendoor::trace::{Block, Trace};
 
 /// Layers over every pixel: two million fragments.
 const SCENE: &str = "builtin:layers:count=32,alpha=0.1,coloured=true";
 const SIDE: u32 = 256;
 const SAMPLES: u32 = 8;
-const COMPRESSIONS: [(&str, Compression); 3] =
-    [("none", Compression::None), ("lz4", Compression::Lz4), ("zstd", Compression::Zstd)];
 
 /// Counts a tile's fragments.
 struct Counting;
@@ -70,11 +68,7 @@ impl Engine for Counting {
 /// The trace with its columns stored in each way, in memory: no file system is timed.
 fn traces() -> Vec<(&'static str, Trace)> {
     let captured = captured(SCENE, SIDE);
-    let store = |(name, compression)| {
-        let options = WriteOptions { compression, ..WriteOptions::default() };
-        let bytes = common::write(&captured, Vec::new(), options);
-        (name, Trace::from_bytes(bytes, name).expect("it opens"))
-    };
+    let store = |(name, compression)| (name, stored(&captured, compression));
     COMPRESSIONS.into_iter().map(store).collect()
 }
 

@@ -9,12 +9,13 @@ use std::collections::HashMap;
 use std::hint::black_box;
 use std::path::Path;
 
+use common::{COMPRESSIONS, stored};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use rayon::ThreadPoolBuilder;
 use screendoor::capture::{Capture, CaptureOptions};
 use screendoor::design::DESIGNS;
 use screendoor::rop::ReplayOptions;
-use screendoor::trace::{Compression, Trace, WriteOptions};
+use screendoor::trace::{Compression, Trace};
 
 /// The trace that is timed, and the scene it is made of (`traces/README.md`).
 const TRACE: &str = "engine";
@@ -53,20 +54,11 @@ fn capture(c: &mut Criterion) {
     group.finish();
 }
 
-/// The same trace in memory, its columns stored otherwise.
-fn stored(source: &Trace, compression: Compression) -> Trace {
-    let options = WriteOptions { compression, ..WriteOptions::default() };
-    let bytes = common::write(source, Vec::new(), options);
-    Trace::from_bytes(bytes, TRACE).expect("it opens")
-}
-
 fn read(c: &mut Criterion) {
     let source = open();
     let mut group = c.benchmark_group("read");
     group.throughput(Throughput::Elements(source.rows()));
-    for (name, compression) in
-        [("none", Compression::None), ("lz4", Compression::Lz4), ("zstd", Compression::Zstd)]
-    {
+    for (name, compression) in COMPRESSIONS {
         let trace = stored(&source, compression);
         let hash = trace.verify(|_| ()).expect("it holds");
         assert_eq!(Some(hash.as_str()), source.content(), "the trace has changed");

@@ -11,11 +11,14 @@
 #[inline]
 pub const fn mix(mut x: u32) -> u32 {
     x ^= x >> 16;
-    x = x.wrapping_mul(0x7feb_352d);
+    x = x.wrapping_mul(MIX[0]);
     x ^= x >> 15;
-    x = x.wrapping_mul(0x846c_a68b);
+    x = x.wrapping_mul(MIX[1]);
     x ^ (x >> 16)
 }
+
+/// The factors of [`mix`].
+pub(crate) const MIX: [u32; 2] = [0x7feb_352d, 0x846c_a68b];
 
 /// The fraction of the golden ratio, of 2^32: far from any small number.
 pub const GOLDEN: u32 = 0x9e37_79b9;

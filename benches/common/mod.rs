@@ -11,7 +11,7 @@ use screendoor::capture::{Capture, CaptureOptions};
 use screendoor::param::Options;
 use screendoor::rop::{Engine, EventCounts, Frame, TileState, Told, Which};
 use screendoor::tile::TileId;
-use screendoor::trace::{Block, SampleMask, Trace, TraceWriter, WriteOptions};
+use screendoor::trace::{Block, Compression, SampleMask, Trace, TraceWriter, WriteOptions};
 
 /// A square trace of a scene, in memory.
 pub fn captured(scene: &str, side: u32) -> Trace {
@@ -33,12 +33,21 @@ pub fn write<W: Write>(source: &Trace, to: W, options: WriteOptions) -> W {
     writer.finish().expect("it writes").0
 }
 
-/// The same trace in a file, mapped.
-pub fn in_file(source: &Trace, path: &Path) -> Trace {
+/// How a trace's columns can be stored.
+pub const COMPRESSIONS: [(&str, Compression); 3] =
+    [("none", Compression::None), ("lz4", Compression::Lz4), ("zstd", Compression::Zstd)];
+
+/// The same trace in memory, its columns stored otherwise.
+pub fn stored(source: &Trace, compression: Compression) -> Trace {
+    let options = WriteOptions { compression, ..WriteOptions::default() };
+    Trace::from_bytes(write(source, Vec::new(), options), "bench").expect("it opens")
+}
+
+/// A trace that `write` writes to a file, mapped.
+pub fn in_file(path: &Path, write: impl FnOnce(BufWriter<File>) -> BufWriter<File>) -> Trace {
     let file = File::create(path).expect("it is writable");
     // Large writes make large folios of the page cache, which are mapped sooner.
-    let file = BufWriter::with_capacity(1 << 20, file);
-    write(source, file, WriteOptions::default()).flush().expect("it writes");
+    write(BufWriter::with_capacity(1 << 20, file)).flush().expect("it writes");
     Trace::open(path).expect("it opens")
 }
 

@@ -21,7 +21,7 @@ use crate::rop::tracked::{
 };
 use crate::rop::{
     Blueprint, Dither, Engine, Family, Frame, Info, OpaquePromise, OrderPromise, Probe, Promises,
-    Reference, Round, Stochastic, depth_bits,
+    Reference, ReferenceKey, Round, Stochastic, depth_bits,
 };
 
 crate::options! {
@@ -229,7 +229,7 @@ fn evenly<S: Simd, L: Lanes<S>>(simd: S, loaded: &Loaded<L>, start: u32, limit: 
 }
 
 /// [`Evenly`] with the parameters that it has by default, known when the kernel is
-/// compiled, and without a branch that chance decides.
+/// compiled.
 #[derive(Clone, Copy, Debug)]
 pub struct Summed;
 
@@ -246,8 +246,8 @@ impl<const N: usize> FastReferences<N> for Summed {
     }
 
     /// One value a pixel, whatever the round.
-    fn base(_: &Round, pixel: u32, seed: u32) -> Base {
-        Base::of(0, 1, pixel, seed)
+    fn base(_: &Round, key: &ReferenceKey) -> Base {
+        Base::of(0, 1, key)
     }
 
     #[inline(always)]
@@ -287,7 +287,7 @@ fn first(base: Base) -> u32 {
 mod tests {
     use super::*;
     use crate::random::Stream;
-    use crate::rop::{PixelIndex, ReferenceKey, Site, Threshold};
+    use crate::rop::{PixelIndex, Site, Threshold};
 
     /// Which of a surface's samples pass, their alphas given fragment by fragment.
     fn passes(phase: Phase, seed: u32, fragments: &[(f32, usize)]) -> Vec<bool> {

@@ -82,7 +82,7 @@ pub const fn prehash(n: u32) -> u32 {
 /// it is 64 bits wide; what lies above 32 bits, like the seed, moves the sequence
 /// to an unrelated place, and 0 leaves it where figure 4 has it.
 #[inline]
-fn place(n: u32, samples: u32, key: &ReferenceKey) -> (u32, u32) {
+pub(in crate::rop) fn place(n: u32, samples: u32, key: &ReferenceKey) -> (u32, u32) {
     let index = u64::from(n) + u64::from(key.pixel.0) * u64::from(samples);
     let moved =
         key.surface.wrapping_add(scatter(key.seed)).wrapping_add(scatter((index >> 32) as u32));

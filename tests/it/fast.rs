@@ -1,6 +1,7 @@
 //! The fast engines give the bits of the plain text: state, events and picture.
 
 use screendoor::design::{Configured, DESIGNS};
+use screendoor::param::Options;
 use screendoor::random::Stream;
 use screendoor::rop::{EventCounts, Frame, Site, Told, Which};
 use screendoor::tile::{TileGrid, TileId};
@@ -10,8 +11,9 @@ use crate::util::{header, trace, variants};
 
 /// The engines that this machine can run, but for the reference.
 fn engines() -> Vec<Which> {
-    let all = [Which::Avx512, Which::Avx2, Which::Neon, Which::Portable];
-    all.into_iter().filter(|which| which.level().is_ok()).collect()
+    // `Fast` is one of the others.
+    let own = |which: &Which| *which != Which::Fast && matches!(which.level(), Ok(Some(_)));
+    Which::ALL.iter().copied().filter(own).collect()
 }
 
 /// Fragments that crowd a few pixels of one tile: depths from a handful of levels or

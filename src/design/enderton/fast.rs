@@ -3,7 +3,7 @@
 use fearless_simd::Simd;
 
 use crate::design::enderton::{Among, EndertonSampler, MaskRule, Words};
-use crate::random::{GOLDEN, hash};
+use crate::random::{GOLDEN, MIX, hash};
 use crate::rop::fast::{
     FastSampler, Lanes, Loaded, Offered, Tally, below, picked, ranks_of_distinct,
 };
@@ -98,7 +98,7 @@ fn words_of_samples<S: Simd, L: Lanes<S>>(simd: S, loaded: &Loaded<L>, words: Wo
     let before = hash([words.seed, words.pixel, words.source]);
     // `random::mix`.
     let x = loaded.lanes.xor(word(before)).add(word(GOLDEN));
-    let x = x.xor(x.shift_right_zeros(16)).mul(word(0x7feb_352d));
-    let x = x.xor(x.shift_right_zeros(15)).mul(word(0x846c_a68b));
+    let x = x.xor(x.shift_right_zeros(16)).mul(word(MIX[0]));
+    let x = x.xor(x.shift_right_zeros(15)).mul(word(MIX[1]));
     x.xor(x.shift_right_zeros(16))
 }

@@ -2,13 +2,12 @@
 
 use fearless_simd::Simd;
 
-use crate::random::scatter;
 use crate::rop::event::Probe;
 use crate::rop::fast::engine::Loaded;
 use crate::rop::fast::lanes::Lanes;
 use crate::rop::fast::tally::Tally;
 use crate::rop::opacity::Threshold;
-use crate::rop::reference_value::{LK2011, Reference, ReferenceKey, scramble_lk2011};
+use crate::rop::reference_value::{LK2011, Reference, ReferenceKey, place, scramble_lk2011};
 use crate::rop::stochastic::Round;
 use crate::rop::tracked::{Hashed, References, SampleOf};
 
@@ -40,14 +39,11 @@ pub struct Base {
 }
 
 impl Base {
-    /// Of surface 0 of the pixel of this index, whose values are those from the `earlier`-th of
-    /// `total`.
+    /// Of the surface of `key`, whose values are those from the `earlier`-th of `total`.
     #[inline]
-    pub fn of(earlier: u32, total: u32, pixel: u32, seed: u32) -> Self {
-        let first = u64::from(earlier) + u64::from(pixel) * u64::from(total);
-        // On frames of more than 2^32 samples.
-        let beyond = if first >> 32 != 0 { scatter((first >> 32) as u32) } else { 0 };
-        Base { reversed: (first as u32).reverse_bits(), moved: scatter(seed).wrapping_add(beyond) }
+    pub fn of(earlier: u32, total: u32, key: &ReferenceKey) -> Self {
+        let (reversed, moved) = place(earlier, total, key);
+        Base { reversed, moved }
     }
 
     /// That of a surface so many later.
@@ -75,9 +71,9 @@ pub trait FastReferences<const N: usize>: Copy + Send + Sync + 'static {
     /// The other way.
     fn of_plain(kept: &<Self::Plain as References>::Kept) -> Self::Kept;
 
-    /// What a pixel's values have in common in a round.
-    fn base(round: &Round, pixel: u32, seed: u32) -> Base {
-        Base::of(round.index * N as u32, round.count * N as u32, pixel, seed)
+    /// What a surface's values have in common in a round.
+    fn base(round: &Round, key: &ReferenceKey) -> Base {
+        Base::of(round.index * N as u32, round.count * N as u32, key)
     }
 
     /// Which of the samples pass the opacity test: bit `i` for the `i`-th of them.

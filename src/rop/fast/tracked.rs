@@ -206,8 +206,8 @@ impl<R: Rules, F: FastReferences<N>, const N: usize> FastSampler<N> for FastTrac
 
     fn enter(&self, round: &Round, states: &mut [Self::State; TILE_PIXELS]) {
         for state in states {
-            let base = F::base(round, state.pixel.0, round.seed);
-            state.base = base.of_surface(state.surface);
+            let Track { pixel, surface, .. } = *state;
+            state.base = F::base(round, &ReferenceKey { pixel, surface, seed: round.seed });
         }
     }
 
@@ -273,7 +273,7 @@ impl<R: Rules, F: FastReferences<N>, const N: usize> FastSampler<N> for FastTrac
             true => {
                 let key = key.prehashed();
                 let before = key.surface.wrapping_sub(u32::from(starts));
-                (key, F::base(round, key.pixel.0, key.seed).of_surface(before))
+                (key, F::base(round, &ReferenceKey { surface: before, ..key }))
             }
             false => (key, p.base),
         };
