@@ -43,6 +43,16 @@ pub enum Error {
         /// What its owner can do.
         hint: String,
     },
+    /// A GPU is missing, has failed, or cannot do what it is asked for.
+    #[error("{adapter}: {what}; {hint}")]
+    Gpu {
+        /// Which one.
+        adapter: String,
+        /// What is wrong with it.
+        what: String,
+        /// What to install or to choose.
+        hint: String,
+    },
     /// The caller asked for something that does not exist or cannot be.
     #[error("{what}; {hint}")]
     Config {
@@ -71,6 +81,11 @@ impl Error {
             what: what.to_string(),
             hint: hint.to_string(),
         }
+    }
+
+    /// An [`Error::Gpu`] of `adapter`.
+    pub fn gpu(adapter: impl Display, what: impl Display, hint: impl Display) -> Self {
+        Error::Gpu { adapter: adapter.to_string(), what: what.to_string(), hint: hint.to_string() }
     }
 
     /// An [`Error::Config`].

@@ -41,6 +41,7 @@ pub mod capture;
 pub mod cli;
 pub mod design;
 pub mod error;
+pub mod gpu;
 pub mod metrics;
 pub mod output;
 pub mod param;

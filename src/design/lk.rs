@@ -16,7 +16,7 @@ use crate::rop::tracked::{
     chance_decides_surfaces,
 };
 use crate::rop::{
-    Blueprint, Engine, Family, Frame, Info, OpaquePromise, OrderPromise, Promises, Reference,
+    Blueprint, Engine, Family, Frame, Info, OpaquePromise, OrderPromise, Port, Promises, Reference,
     Stochastic, depth_bits,
 };
 
@@ -69,6 +69,13 @@ impl Blueprint for LaineKarras {
         let references = Hashed(values.choice(REFERENCE.name));
         let sampler = FastTracked::<_, _, N>::new(values, Given::of(values), references);
         Ok(Some(Box::new(FastEngine::new(plain, sampler, level))))
+    }
+
+    const PORTED: bool = true;
+
+    fn port<const N: usize>(values: &Values, frame: &Frame) -> Result<Option<Port>> {
+        let plain = Self::at::<N>(values, frame)?;
+        Ok(Some(stochastic::port("lk", &Self::INFO, values, frame, plain)))
     }
 
     fn promises(values: &Values) -> Promises {

@@ -40,10 +40,11 @@ pub use systematic::Systematic;
 pub use wboit::WeightedBlended;
 
 use crate::error::{Error, Result};
+use crate::gpu::{Gpu, GpuOptions, GpuRun, GpuSeconds};
 use crate::param::{Values, parse_spec};
 use crate::rop::fast::{Count, Width};
 use crate::rop::{
-    Blueprint, Engine, Explanation, Frame, Info, PrimitiveDepths, Promises, ReplayOptions,
+    Blueprint, Engine, Explanation, Frame, Info, Port, PrimitiveDepths, Promises, ReplayOptions,
     Replayed, Site, StateBits, Which, explain, replay,
 };
 use crate::trace::Trace;
@@ -81,6 +82,8 @@ pub struct Entry {
     pub info: Info,
     promises: fn(&Values) -> Promises,
     build: fn(&Values, &Frame, Which) -> Result<Box<dyn Engine>>,
+    port: fn(&Values, &Frame) -> Result<Option<Port>>,
+    ported: bool,
     /// Whether the frame must hold the primitives' mean depths.
     primitive_depths: bool,
 }
@@ -124,14 +127,27 @@ impl Entry {
                 None => Ok(Box::new(B::at::<N>(values, frame)?)),
             }
         }
+        fn port_at<B: Blueprint, const N: usize>(
+            values: &Values,
+            frame: &Frame,
+        ) -> Result<Option<Port>> {
+            B::port::<N>(values, frame)
+        }
         Entry {
             info: B::INFO,
             promises: B::promises,
             build: |values, frame, which| {
                 for_samples!(frame.samples(), build_at::<B>(values, frame, which))
             },
+            port: |values, frame| for_samples!(frame.samples(), port_at::<B>(values, frame)),
+            ported: B::PORTED,
             primitive_depths: B::PRIMITIVE_DEPTHS,
         }
+    }
+
+    /// Whether the design has a port to GPUs.
+    pub fn is_ported(&self) -> bool {
+        self.ported
     }
 
     /// Whether the design draws in an order that the application finds.
@@ -198,6 +214,49 @@ impl Configured {
     ) -> Result<Replayed> {
         let frame = self.frame(trace, samples, seed)?;
         replay(&*self.build(&frame, options.engine)?, &frame, trace, options)
+    }
+
+    /// The design as a GPU runs it.
+    ///
+    /// # Errors
+    /// [`Error::Config`] where it has no port; as [`Blueprint::at`].
+    pub fn port(&self, frame: &Frame) -> Result<Port> {
+        (self.entry.port)(&self.values, frame)?.ok_or_else(|| {
+            let ported = DESIGNS.iter().filter(|e| e.ported).map(|e| e.info.name);
+            Error::config(
+                format_args!("'{}' has no port to GPUs", self.info().name),
+                format_args!(
+                    "replay it with --engine fast; {} have one",
+                    ported.collect::<Vec<_>>().join(", ")
+                ),
+            )
+        })
+    }
+
+    /// Replays `trace` on a GPU.
+    ///
+    /// # Errors
+    /// As [`Configured::port`], [`Frame::of`] and [`GpuRun::new`].
+    pub fn replay_on(
+        &self,
+        gpu: &Gpu,
+        trace: &Trace,
+        samples: u32,
+        seed: u32,
+        options: &GpuOptions<'_>,
+    ) -> Result<(Replayed, GpuSeconds)> {
+        let frame = self.frame(trace, samples, seed)?;
+        let port = self.port(&frame)?;
+        let mut run = GpuRun::new(gpu, &port, &frame, trace, options)?;
+        let picture = run.picture()?;
+        let replayed = Replayed {
+            picture,
+            events: None,
+            state_bits: port.plain.state_bits(),
+            passes: port.plain.passes(),
+            touched_tiles: run.touched_tiles(),
+        };
+        Ok((replayed, run.seconds().clone()))
     }
 
     /// Replays one pixel and writes down what happens.

@@ -20,8 +20,9 @@ use crate::rop::tracked::{
     TrackedSampler, chance_decides_surfaces,
 };
 use crate::rop::{
-    Blueprint, Dither, Engine, Family, Frame, Info, OpaquePromise, OrderPromise, Probe, Promises,
-    Reference, ReferenceKey, Round, Stochastic, depth_bits,
+    Blueprint, Declaration, Dither, Engine, Family, Frame, Info, OnDevice, OpaquePromise,
+    OrderPromise, PixelWords, Port, Probe, Promises, Reference, ReferenceKey, Round, Site,
+    Stochastic, depth_bits,
 };
 
 crate::options! {
@@ -90,6 +91,13 @@ impl Blueprint for Systematic {
         }
         let sampler = FastTracked::<_, _, N>::new(values, Given::of(values), references);
         Ok(Some(Box::new(FastEngine::new(plain, sampler, level))))
+    }
+
+    const PORTED: bool = true;
+
+    fn port<const N: usize>(values: &Values, frame: &Frame) -> Result<Option<Port>> {
+        let plain = Self::at::<N>(values, frame)?;
+        Ok(Some(stochastic::port("systematic", &Self::INFO, values, frame, plain)))
     }
 
     fn promises(values: &Values) -> Promises {
@@ -171,6 +179,21 @@ impl References for Evenly {
             Phase::Sum => 32,
             Phase::Count => 0,
         }
+    }
+}
+
+impl OnDevice<Option<u32>> for Evenly {
+    fn declare(&self, to: &mut Declaration) {
+        if let Some(ranks) = self.dither.ranks() {
+            to.ranks(ranks);
+        }
+        // Whether there is one, behind it.
+        to.field("PHASE", if self.phase == Phase::Sum { 2 } else { 0 });
+    }
+
+    fn read(&self, _: Site, from: &PixelWords<'_>) -> Option<u32> {
+        let words: Vec<u32> = from.field("PHASE").collect();
+        (words.get(1) == Some(&1)).then(|| words[0])
     }
 }
 
@@ -287,7 +310,7 @@ fn first(base: Base) -> u32 {
 mod tests {
     use super::*;
     use crate::random::Stream;
-    use crate::rop::{PixelIndex, Site, Threshold};
+    use crate::rop::{PixelIndex, Threshold};
 
     /// Which of a surface's samples pass, their alphas given fragment by fragment.
     fn passes(phase: Phase, seed: u32, fragments: &[(f32, usize)]) -> Vec<bool> {

@@ -10,6 +10,7 @@ use crate::param::{Param, Values};
 use crate::rop::event::Probe;
 use crate::rop::fast::{Count, Width};
 use crate::rop::over_opaque::{self, Opaque};
+use crate::rop::port::Port;
 use crate::rop::primitive_depths::PrimitiveDepths;
 use crate::rop::replay::Engine;
 use crate::rop::samples::SampleContents;
@@ -297,6 +298,17 @@ pub trait Blueprint: 'static {
     where
         Count<N>: Width,
     {
+        Ok(None)
+    }
+
+    /// Whether it has a [`Blueprint::port`].
+    const PORTED: bool = false;
+
+    /// The design as another device runs it, where [`Blueprint::PORTED`].
+    ///
+    /// # Errors
+    /// As [`Blueprint::at`].
+    fn port<const N: usize>(_values: &Values, _frame: &Frame) -> Result<Option<Port>> {
         Ok(None)
     }
 

@@ -31,14 +31,23 @@ const OFFSET: u32 = 0x0ff5_e700;
 const FINE: u32 = 0x0f19_e000;
 
 impl Dither {
+    /// The matrix of a dither that has one.
+    pub fn ranks(self) -> Option<&'static Ranks> {
+        match self {
+            Dither::White | Dither::Sequence => None,
+            Dither::Bayer => Some(&BAYER),
+            Dither::BlueNoise => Some(&BLUE_NOISE),
+        }
+    }
+
     /// ξ of a surface in a pixel, as a 32-bit fraction of 1: uniform over the seeds,
     /// and independent from surface to surface.
     pub fn value(self, site: Site, key: &ReferenceKey, reference: Reference) -> u32 {
-        let ranks = match self {
-            Dither::White => return hash([key.seed, key.pixel.0, key.surface, FINE]),
-            Dither::Sequence => return reference.value(0, 1, key),
-            Dither::Bayer => &*BAYER,
-            Dither::BlueNoise => &*BLUE_NOISE,
+        let Some(ranks) = self.ranks() else {
+            return match self {
+                Dither::Sequence => reference.value(0, 1, key),
+                _ => hash([key.seed, key.pixel.0, key.surface, FINE]),
+            };
         };
         let offset = hash([key.seed, key.surface, OFFSET]);
         let x = (u32::from(site.x) + offset) as usize % TILE;

@@ -14,6 +14,7 @@ mod normalise;
 mod opacity;
 pub mod over_opaque;
 mod pixel_order;
+mod port;
 mod primitive_depths;
 mod reference_value;
 mod replay;
@@ -37,6 +38,7 @@ pub use normalise::{Normalise, Sums};
 pub use opacity::Threshold;
 pub use over_opaque::{Opaque, OverOpaque, Transparent};
 pub use pixel_order::{PixelIndex, PixelOrder};
+pub use port::{Constant, Declaration, Field, OnDevice, PixelWords, Port, TileWords};
 pub use primitive_depths::PrimitiveDepths;
 pub use reference_value::{Reference, ReferenceKey, prehash, scramble_lk2011};
 pub use replay::{

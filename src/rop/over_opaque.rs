@@ -9,6 +9,7 @@ use crate::param::{Param, Values};
 use crate::resolve::box_filter;
 use crate::rop::design::{Contents, Design, Frame, Site, StateBits};
 use crate::rop::event::Probe;
+use crate::rop::port::{Constant, Declaration, OnDevice, PixelWords};
 use crate::rop::samples::Samples;
 use crate::trace::{Fragment, SampleMask, Unorm32};
 
@@ -202,5 +203,28 @@ impl<T: Transparent<N>, const N: usize> Design for OverOpaque<T, N> {
 
     fn bytes_per_fragment(&self) -> Option<usize> {
         self.inner.bytes_per_fragment()
+    }
+}
+
+impl<T, const N: usize> OnDevice<OverOpaquePixel<T::Pixel, N>> for OverOpaque<T, N>
+where
+    T: Transparent<N> + OnDevice<T::Pixel>,
+{
+    fn declare(&self, to: &mut Declaration) {
+        let first = self.opaque == Opaque::First;
+        to.constant("OPAQUE_FIRST_HERE", Constant::Flag(first));
+        let samples = if first { N as u32 } else { 0 };
+        to.field("HAS_OPAQUE", u32::from(first));
+        to.field("OPAQUE_DEPTH", samples);
+        to.field("OPAQUE_COLOUR", 3 * samples);
+        self.inner.declare(to);
+    }
+
+    fn read(&self, site: Site, from: &PixelWords<'_>) -> OverOpaquePixel<T::Pixel, N> {
+        let opaque = self.opaque == Opaque::First && from.word("HAS_OPAQUE") == 1;
+        OverOpaquePixel {
+            opaque: opaque.then(|| Box::new(Samples::read(from, "OPAQUE_DEPTH", "OPAQUE_COLOUR"))),
+            inner: self.inner.read(site, from),
+        }
     }
 }

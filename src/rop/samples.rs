@@ -3,6 +3,7 @@
 use arrayvec::ArrayVec;
 use serde::Serialize;
 
+use crate::rop::port::PixelWords;
 use crate::trace::{SampleMask, Unorm32};
 
 /// Depth and colour of a pixel's `N` samples.
@@ -31,6 +32,11 @@ impl<const N: usize> Samples<N> {
     #[inline]
     pub fn depth_test(&self, covered: SampleMask, z: &[Unorm32; N]) -> SampleMask {
         covered.iter().filter(|s| z[*s] <= self.depth[*s]).collect()
+    }
+
+    /// The samples as a device holds them, in these fields.
+    pub(in crate::rop) fn read(from: &PixelWords<'_>, depth: &str, colour: &str) -> Self {
+        Samples { depth: from.array(depth).map(Unorm32), colour: from.colours(colour) }
     }
 
     /// The samples as `explain` shows them.

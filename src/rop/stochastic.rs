@@ -11,9 +11,12 @@ use crate::param::{Param, Values};
 use crate::random::hash;
 use crate::resolve::box_filter;
 use crate::rop::depth_bits;
-use crate::rop::design::{Contents, Frame, OpaquePromise, OrderPromise, Promises, Site, StateBits};
+use crate::rop::design::{
+    Contents, Frame, Info, OpaquePromise, OrderPromise, Promises, Site, StateBits,
+};
 use crate::rop::event::Probe;
 use crate::rop::over_opaque::{self, Opaque, OverOpaque, Transparent};
+use crate::rop::port::{Constant, Declaration, OnDevice, PixelWords, Port};
 use crate::rop::samples::Samples;
 use crate::trace::{Fragment, SampleMask, Unorm32};
 
@@ -165,6 +168,24 @@ pub fn single_pass<S: Sampler<N>, const N: usize>(
     OverOpaque::new(frame, Opaque::Together, methods)
 }
 
+/// The port of a design made by [`with_methods`]: without sums, a device resolves it.
+pub fn port<S, const N: usize>(
+    program: &'static str,
+    info: &Info,
+    values: &Values,
+    frame: &Frame,
+    plain: Stochastic<S, N>,
+) -> Port
+where
+    S: Sampler<N> + OnDevice<S::State> + Clone + 'static,
+    S::State: Send,
+{
+    let resolves = !plain.inner.has_sums();
+    let mut port = Port::of(program, info, values, frame, plain);
+    port.resolves = resolves;
+    port
+}
+
 /// What a design promises with the shared parameters, of which the single pass
 /// promises `basic` with [`Strata::Round`].
 ///
@@ -269,6 +290,11 @@ impl<S: Sampler<N>, const N: usize> Methods<S, N> {
         }
     }
 
+    /// Whether anything is summed over rounds or passes.
+    fn has_sums(&self) -> bool {
+        self.method != Method::Basic || self.rounds > 1
+    }
+
     /// Bits that a written sample takes: the depth-based methods store no colours.
     pub(in crate::rop) fn sample_bits(&self) -> u32 {
         self.depth_bits + if self.method.depth_based() { 0 } else { self.frame.colour_bits }
@@ -358,7 +384,6 @@ impl<S: Sampler<N>, const N: usize> Transparent<N> for Methods<S, N> {
     }
 
     fn clear(&self, site: Site) -> Self::Pixel {
-        let several = self.method != Method::Basic || self.rounds > 1;
         let sums = Sums {
             transmittance: [if self.method.corrected() { 1.0 } else { 0.0 }; N],
             occupied: SampleMask::NONE,
@@ -368,7 +393,7 @@ impl<S: Sampler<N>, const N: usize> Transparent<N> for Methods<S, N> {
         MethodsPixel {
             samples: Samples::cleared(self.frame.background),
             state: self.sampler.clear(site),
-            sums: several.then(|| Box::new(sums)),
+            sums: self.has_sums().then(|| Box::new(sums)),
         }
     }
 
@@ -462,5 +487,37 @@ impl<S: Sampler<N>, const N: usize> Transparent<N> for Methods<S, N> {
                 .push(("sum", format!("{r:.3} {g:.3} {b:.3}, weight {:.3}", sums.weight)));
         }
         contents
+    }
+}
+
+impl<S, const N: usize> OnDevice<MethodsPixel<S::State, N>> for Methods<S, N>
+where
+    S: Sampler<N> + OnDevice<S::State>,
+{
+    fn declare(&self, to: &mut Declaration) {
+        to.constant("DEPTH_BUFFER_BITS", Constant::Whole(self.depth_bits));
+        to.constant("ROUNDS_LOG2", Constant::Whole(self.rounds.ilog2()));
+        let samples = N as u32;
+        to.field("DEPTH", samples);
+        to.field("COLOUR", 3 * samples);
+        let sums = u32::from(self.has_sums());
+        to.field("TRANSMITTANCE", sums * samples);
+        to.field("OCCUPIED", sums * samples.div_ceil(32));
+        to.field("SUM", sums * 4);
+        self.sampler.declare(to);
+    }
+
+    fn read(&self, site: Site, from: &PixelWords<'_>) -> MethodsPixel<S::State, N> {
+        let sums = || {
+            let [r, g, b, weight] = from.reals("SUM");
+            let occupied = SampleMask(from.mask("OCCUPIED"));
+            let transmittance = from.reals("TRANSMITTANCE");
+            Box::new(Sums { transmittance, occupied, colour: [r, g, b], weight })
+        };
+        MethodsPixel {
+            samples: Samples::read(from, "DEPTH", "COLOUR"),
+            state: self.sampler.read(site, from),
+            sums: self.has_sums().then(sums),
+        }
     }
 }

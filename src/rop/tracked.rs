@@ -9,10 +9,11 @@ use crate::rop::design::{Frame, Site};
 use crate::rop::event::Probe;
 use crate::rop::opacity::Threshold;
 use crate::rop::pixel_order::{PixelIndex, PixelOrder};
+use crate::rop::port::{Declaration, OnDevice, PixelWords};
 use crate::rop::reference_value::{Reference, ReferenceKey};
 use crate::rop::samples::{SampleList, in_sample_order, sort_by_stored_depth};
 use crate::rop::stochastic::{Round, Sampler};
-use crate::rop::surface::{SurfaceRule, SurfaceTracker, Tracked};
+use crate::rop::surface::{CoveredMask, SurfaceRule, SurfaceTracker, Tracked};
 use crate::tile::TileGrid;
 use crate::trace::{Fragment, SampleMask, Unorm32};
 
@@ -233,4 +234,36 @@ impl<R: References, const N: usize> Sampler<N> for TrackedSampler<R, N> {
     fn fields(&self, p: &Self::State) -> Vec<(&'static str, String)> {
         p.surface.fields()
     }
+}
+
+impl<R, const N: usize> OnDevice<TrackedState<R::Kept>> for TrackedSampler<R, N>
+where
+    R: References + OnDevice<R::Kept>,
+{
+    fn declare(&self, to: &mut Declaration) {
+        let by_source = matches!(self.surfaces, SurfaceRule::Primitive | SurfaceRule::Object);
+        to.field("COVERED", (N as u32).div_ceil(32));
+        to.field("SURFACE", 1);
+        to.field("NUMBERED", 1);
+        // Whether there is one, behind it.
+        to.field("LAST", if by_source { 2 } else { 0 });
+        self.references.declare(to);
+    }
+
+    fn read(&self, site: Site, from: &PixelWords<'_>) -> TrackedState<R::Kept> {
+        let last: Vec<u32> = from.field("LAST").collect();
+        let surface = SurfaceTracker {
+            covered: CoveredMask::new([from.mask("COVERED")]),
+            surface_id: from.word("SURFACE"),
+            numbered: from.word("NUMBERED"),
+            last: (last.get(1) == Some(&1)).then(|| last[0]),
+        };
+        let pixel_id = self.pixel_order.index(site, self.grid);
+        TrackedState { surface, pixel_id, kept: self.references.read(site, from) }
+    }
+}
+
+impl OnDevice<()> for Hashed {
+    fn declare(&self, _: &mut Declaration) {}
+    fn read(&self, _: Site, _: &PixelWords<'_>) {}
 }

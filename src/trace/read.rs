@@ -177,6 +177,11 @@ impl Trace {
         &self.inner.place
     }
 
+    /// The columns that are stored, in the file's order; the others are constant.
+    pub(crate) fn columns(&self) -> &[(ColumnId, ValueType)] {
+        &self.inner.columns
+    }
+
     /// How many fragments it holds.
     pub fn rows(&self) -> u64 {
         self.inner.rows

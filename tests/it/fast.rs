@@ -19,7 +19,7 @@ fn engines() -> Vec<Which> {
 /// Fragments that crowd a few pixels of one tile: depths from a handful of levels or
 /// anywhere, flat, sloped and very steep planes, the ends of the depth range, all
 /// kinds of masks, alpha 0, tiny, middling and 1.
-fn crowd(header: &Header, count: usize, seed: u32) -> Vec<Fragment> {
+pub fn crowd(header: &Header, count: usize, seed: u32) -> Vec<Fragment> {
     let mut random = Stream::new([0xfa57, seed]);
     let all = SampleMask::first(header.pattern.samples());
     let fragment = |i: usize| {

@@ -6,6 +6,7 @@ mod conformance;
 mod events;
 mod fast;
 mod golden;
+mod gpu;
 mod guarantees;
 mod hostile;
 mod large;

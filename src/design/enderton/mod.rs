@@ -12,9 +12,9 @@ use crate::random::hash;
 use crate::rop::fast::{Count, FastEngine, Width};
 use crate::rop::stochastic::{self, COMBINATIONS, METHOD, OPAQUE, ROUNDS, STRATA};
 use crate::rop::{
-    Blueprint, Dither, Engine, Family, Frame, Info, OpaquePromise, OrderPromise, PixelOrder, Probe,
-    Promises, Reference, ReferenceKey, Round, Sampler, Site, Stochastic, Threshold, depth_bits,
-    random_subset,
+    Blueprint, Declaration, Dither, Engine, Family, Frame, Info, OnDevice, OpaquePromise,
+    OrderPromise, PixelOrder, PixelWords, Port, Probe, Promises, Reference, ReferenceKey, Round,
+    Sampler, Site, Stochastic, Threshold, depth_bits, random_subset,
 };
 use crate::tile::TileGrid;
 use crate::trace::{Fragment, MAX_SAMPLES, SampleMask, Unorm32};
@@ -97,6 +97,13 @@ impl Blueprint for Enderton {
         };
         let plain = Self::at::<N>(values, frame)?;
         Ok(Some(Box::new(FastEngine::new(plain, sampler, level))))
+    }
+
+    const PORTED: bool = true;
+
+    fn port<const N: usize>(values: &Values, frame: &Frame) -> Result<Option<Port>> {
+        let plain = Self::at::<N>(values, frame)?;
+        Ok(Some(stochastic::port("enderton", &Self::INFO, values, frame, plain)))
     }
 
     fn promises(values: &Values) -> Promises {
@@ -296,4 +303,14 @@ impl<const N: usize> EndertonSampler<N> {
         let word = |slot| hash([words.seed, row, column, slot]);
         Self::subset(round, SampleMask::first(N as u32), count as u32, word)
     }
+}
+
+impl<const N: usize> OnDevice<()> for EndertonSampler<N> {
+    fn declare(&self, to: &mut Declaration) {
+        if let Some(ranks) = self.dither.ranks() {
+            to.ranks(ranks);
+        }
+    }
+
+    fn read(&self, _: Site, _: &PixelWords<'_>) {}
 }

@@ -1,0 +1,17 @@
+//! The wgpu compute port: the same replay on a GPU, for comparison and for its bits.
+//!
+//! A design that can run there describes itself as a [`crate::rop::Port`]: its parameters
+//! become a shader's constants, its pixels' state words in memory. The shaders in
+//! `gpu/shaders` are twins of the Rust files of the same name. What decides is integer
+//! arithmetic on both sides, so that the stochastic family leaves the same bits.
+
+mod bin;
+mod chunk;
+mod device;
+mod params;
+mod replay;
+mod shader;
+mod time;
+
+pub use device::{Adapter, Gpu};
+pub use replay::{GpuOptions, GpuRun, GpuSeconds};

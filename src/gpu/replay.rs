@@ -1,0 +1,396 @@
+//! Replaying a trace on a GPU: chunk by chunk, sorted by pixel there, a thread for each
+//! pixel; the pixels' state stays on the device.
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::error::Result;
+use crate::gpu::bin::{Binner, Scratch, Sorted, dispatch, uniform};
+use crate::gpu::chunk::{Chunks, Uploaded};
+use crate::gpu::device::{Access, Binding, Gpu};
+use crate::gpu::params::Params;
+use crate::gpu::shader;
+use crate::gpu::time::Timer;
+use crate::picture::{Picture, TilePixels};
+use crate::rop::{Frame, Port, TileState, TileWords};
+use crate::tile::{TILE_PIXELS, TileId, TileMap};
+use crate::trace::Trace;
+
+/// How to replay on a GPU; none of it changes the picture.
+#[derive(Clone, Copy)]
+pub struct GpuOptions<'a> {
+    /// Rows of a chunk, at most; fewer where a buffer holds fewer.
+    pub rows: u64,
+    /// Bytes of chunks that stay on the device for the next pass.
+    pub resident: u64,
+    /// Is told how many fragments have been drawn, of how many.
+    pub progress: &'a (dyn Fn(u64, u64) + Sync),
+}
+
+impl Default for GpuOptions<'_> {
+    fn default() -> Self {
+        GpuOptions { rows: u64::MAX, resident: 1 << 31, progress: &|_, _| () }
+    }
+}
+
+/// Where the time of a replay went, in seconds.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct GpuSeconds {
+    /// The whole, by the clock on the wall.
+    pub wall: f64,
+    /// Reading the file and bringing it to the device.
+    pub upload: f64,
+    /// Bringing the picture back, or the state, and resolving it.
+    pub back: f64,
+    /// By the device's clock, where it has one: `bin`, `draw` and others.
+    pub device: Option<BTreeMap<&'static str, f64>>,
+}
+
+/// A replay on a GPU, its state still there.
+pub struct GpuRun<'a> {
+    gpu: &'a Gpu,
+    port: &'a Port,
+    frame: &'a Frame,
+    params: Params,
+    programs: Programs,
+    timer: Timer,
+    pages: Vec<Page>,
+    /// The touched tiles, in the order of their places.
+    tiles: Vec<TileId>,
+    seconds: GpuSeconds,
+    start: Instant,
+}
+
+/// The state of some tiles' pixels.
+struct Page {
+    state: wgpu::Buffer,
+    /// Its first tile's place, and how many it holds.
+    first: usize,
+    tiles: usize,
+}
+
+/// A chunk on the device, sorted.
+struct Ready {
+    uploaded: Uploaded,
+    sorted: Sorted,
+}
+
+/// The design's programs.
+struct Programs {
+    layout: wgpu::BindGroupLayout,
+    clear: wgpu::ComputePipeline,
+    draw: wgpu::ComputePipeline,
+    end_pass: wgpu::ComputePipeline,
+    resolve: Option<wgpu::ComputePipeline>,
+    tables: wgpu::Buffer,
+}
+
+/// Threads of a group of `shaders/replay.wgsl`.
+const GROUP: usize = 64;
+
+impl Programs {
+    fn new(gpu: &Gpu, port: &Port, frame: &Frame, chunks: &Chunks) -> Result<Self> {
+        let source = source(port, frame.samples(), chunks);
+        use Access::{Read, Uniform, Write};
+        let bindings = [Uniform, Read, Read, Write, Read, Read, Read, Write];
+        let bindings = bindings.iter().enumerate();
+        let bindings: Vec<Binding> =
+            bindings.map(|(i, access)| Binding { number: i as u32, access: *access }).collect();
+        let layout = gpu.layout(&bindings);
+        let program = |entry| gpu.pipeline(&source, entry, &layout);
+        Ok(Programs {
+            clear: program("clear")?,
+            draw: program("draw")?,
+            end_pass: program("end_pass")?,
+            resolve: if port.resolves { Some(program("resolve")?) } else { None },
+            tables: gpu.filled(
+                "tables",
+                bytemuck::cast_slice(&tables(port, frame)),
+                wgpu::BufferUsages::STORAGE,
+            )?,
+            layout,
+        })
+    }
+}
+
+/// The text of a design's program for a trace's columns.
+fn source(port: &Port, samples: u32, chunks: &Chunks) -> String {
+    let mut constants = port.constants.clone();
+    constants.extend(chunks.types());
+    constants.extend(port.places());
+    shader::program(port.program, samples, &constants)
+}
+
+/// The samples' places and what else the design asks for.
+fn tables(port: &Port, frame: &Frame) -> Vec<u32> {
+    let place = |[x, y]: &[i8; 2]| u32::from(*x as i16 as u16) | u32::from(*y as i16 as u16) << 16;
+    let places = frame.positions.iter().map(place);
+    let ranks = port.ranks.into_iter().flatten().copied().collect::<Vec<u16>>();
+    places.chain(ranks.chunks(2).map(|r| u32::from(r[0]) | u32::from(r[1]) << 16)).collect()
+}
+
+impl<'a> GpuRun<'a> {
+    /// Draws all of `trace`.
+    ///
+    /// # Errors
+    /// As [`Trace::batch`]; [`crate::error::Error::Gpu`] where the device fails.
+    pub fn new(
+        gpu: &'a Gpu,
+        port: &'a Port,
+        frame: &'a Frame,
+        trace: &Trace,
+        options: &GpuOptions<'_>,
+    ) -> Result<Self> {
+        let start = Instant::now();
+        let limits = gpu.limits();
+        let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        // Behind the keys stands their number.
+        let chunks = Chunks::of(trace, bytes, options.rows.min(bytes / 4 - 1));
+        let mut run = GpuRun {
+            gpu,
+            port,
+            frame,
+            params: Params::of(frame),
+            programs: Programs::new(gpu, port, frame, &chunks)?,
+            timer: Timer::new(gpu)?,
+            pages: Vec::new(),
+            tiles: Vec::new(),
+            seconds: GpuSeconds::default(),
+            start,
+        };
+        run.draw_all(trace, &chunks, options)?;
+        gpu.wait("drawing")?;
+        run.seconds.device = run.timer.seconds(gpu)?;
+        run.seconds.wall = start.elapsed().as_secs_f64();
+        Ok(run)
+    }
+
+    fn draw_all(&mut self, trace: &Trace, chunks: &Chunks, options: &GpuOptions<'_>) -> Result<()> {
+        let constants: Vec<_> = chunks.types().collect();
+        let binner = Binner::new(self.gpu, self.frame.samples(), &constants)?;
+        let most = (0..chunks.len()).map(|i| chunks.rows(i)).max().unwrap_or(0);
+        let scratch = Scratch::new(self.gpu, most)?;
+        let mut slots = vec![0_u32; self.frame.grid.count()];
+        let mut kept: Vec<Option<Ready>> = Vec::new();
+        let mut left = options.resident;
+        let passes = self.port.plain.passes();
+        let (mut done, total) = (0, trace.rows() * u64::from(passes));
+        for pass in 0..passes {
+            self.params.pass_number = pass;
+            for i in 0..chunks.len() {
+                let fresh = match kept.get(i) {
+                    Some(Some(_)) => None,
+                    _ => {
+                        let begun = Instant::now();
+                        let uploaded = chunks.upload(self.gpu, trace, i, &self.params)?;
+                        self.gpu.wait("uploading")?;
+                        self.seconds.upload += begun.elapsed().as_secs_f64();
+                        if pass == 0 {
+                            self.touch(&binner, &uploaded, &mut slots)?;
+                        }
+                        Some(self.sort(&binner, &scratch, uploaded, &slots)?)
+                    }
+                };
+                let ready = fresh.as_ref().or_else(|| kept[i].as_ref()).expect("one of the two");
+                self.draw(ready)?;
+                if pass == 0 && passes > 1 {
+                    let fits = chunks.bytes(i) <= left;
+                    left -= if fits { chunks.bytes(i) } else { 0 };
+                    kept.push(fresh.filter(|_| fits));
+                }
+                done += chunks.rows(i) as u64;
+                (options.progress)(done, total);
+            }
+            self.for_all_pages("end of pass", |run| &run.programs.end_pass, None)?;
+        }
+        Ok(())
+    }
+
+    /// Makes room for the tiles that a chunk is the first to touch.
+    fn touch(&mut self, binner: &Binner, chunk: &Uploaded, slots: &mut [u32]) -> Result<()> {
+        let bits = binner.touched(self.gpu, &self.timer, chunk, slots.len())?;
+        let first = self.tiles.len();
+        for (tile, slot) in slots.iter_mut().enumerate() {
+            let touched = bits[tile / 32] >> (tile % 32) & 1 == 1;
+            let known = self.tiles.get(*slot as usize) == Some(&TileId(tile as u32));
+            if touched && !known {
+                *slot = self.tiles.len() as u32;
+                self.tiles.push(TileId(tile as u32));
+            }
+        }
+        let words = u64::from(self.port.words()) * TILE_PIXELS as u64;
+        let limits = self.gpu.limits();
+        let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let most = ((bytes / (4 * words.max(3))) as usize).max(1);
+        let mut at = first;
+        while at < self.tiles.len() {
+            let tiles = most.min(self.tiles.len() - at);
+            let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
+            let state = self.gpu.buffer("state", 4 * words * tiles as u64, usage)?;
+            self.pages.push(Page { state, first: at, tiles });
+            let page = self.pages.len() - 1;
+            self.run_on(page, "clear", &self.programs.clear, None, None)?;
+            at += tiles;
+        }
+        Ok(())
+    }
+
+    fn sort(
+        &self,
+        binner: &Binner,
+        scratch: &Scratch,
+        uploaded: Uploaded,
+        slots: &[u32],
+    ) -> Result<Ready> {
+        let usage = wgpu::BufferUsages::STORAGE;
+        let slots = self.gpu.filled("tiles' places", bytemuck::cast_slice(slots), usage)?;
+        let places = (&slots, self.tiles.len());
+        let sorted = binner.sort(self.gpu, &self.timer, scratch, &uploaded, places)?;
+        Ok(Ready { uploaded, sorted })
+    }
+
+    fn draw(&self, chunk: &Ready) -> Result<()> {
+        self.for_all_pages("draw", |run| &run.programs.draw, Some(chunk))
+    }
+
+    fn for_all_pages(
+        &self,
+        name: &'static str,
+        pipeline: impl Fn(&Self) -> &wgpu::ComputePipeline,
+        chunk: Option<&Ready>,
+    ) -> Result<()> {
+        let mut pages = 0..self.pages.len();
+        pages.try_for_each(|page| self.run_on(page, name, pipeline(self), chunk, None))
+    }
+
+    /// Runs a program for the pixels of a page, as far as the chunk knows them.
+    fn run_on(
+        &self,
+        page: usize,
+        name: &'static str,
+        pipeline: &wgpu::ComputePipeline,
+        chunk: Option<&Ready>,
+        picture: Option<&wgpu::Buffer>,
+    ) -> Result<()> {
+        let Page { state, first, tiles } = &self.pages[page];
+        let (first_pixel, pixels) = (first * TILE_PIXELS, tiles * TILE_PIXELS);
+        let known = chunk.map_or(usize::MAX, |chunk| chunk.sorted.pixels as usize);
+        let taken = pixels.min(known.saturating_sub(first_pixel));
+        if taken == 0 {
+            return Ok(());
+        }
+        let params = Params {
+            pass_number: self.params.pass_number,
+            first_pixel: first_pixel as u32,
+            pixels: pixels as u32,
+            taken: taken as u32,
+            ..chunk.map_or(self.params, |chunk| chunk.uploaded.params)
+        };
+        let usage = wgpu::BufferUsages::STORAGE;
+        // What is not there is not read.
+        let (nothing, nowhere) =
+            (self.gpu.buffer("nothing", 8, usage)?, self.gpu.buffer("nothing", 8, usage)?);
+        let tile_of: Vec<u32> = self.tiles.iter().map(|tile| tile.0).collect();
+        let tile_of = self.gpu.filled("tiles", bytemuck::cast_slice(&tile_of), usage)?;
+        let buffers = [
+            (0, &uniform(self.gpu, &params)?),
+            (1, chunk.map_or(&nothing, |chunk| &chunk.uploaded.columns)),
+            (2, &self.programs.tables),
+            (3, state),
+            (4, chunk.map_or(&nothing, |chunk| &chunk.sorted.rows)),
+            (5, chunk.map_or(&nothing, |chunk| &chunk.sorted.ends)),
+            (6, &tile_of),
+            (7, picture.unwrap_or(&nowhere)),
+        ];
+        let bound = self.gpu.bind(&self.programs.layout, &buffers);
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        {
+            let mut pass = self.timer.pass(&mut encoder, name);
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, &bound, &[]);
+            dispatch(self.gpu, &mut pass, taken.div_ceil(GROUP) as u64);
+        }
+        self.gpu.submit(encoder, name)
+    }
+
+    /// How many tiles hold a fragment.
+    pub fn touched_tiles(&self) -> usize {
+        self.tiles.len()
+    }
+
+    /// Where the time went, until now.
+    pub fn seconds(&self) -> &GpuSeconds {
+        &self.seconds
+    }
+
+    /// Brings the state back and hands each tile's to `look`, as the plain text holds it.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Gpu`] where the device fails.
+    pub fn states<T: Send>(
+        &self,
+        look: impl Fn(TileId, TileState) -> T + Sync,
+    ) -> Result<Vec<(TileId, T)>> {
+        let mut all = Vec::with_capacity(self.tiles.len());
+        for page in &self.pages {
+            let stride = page.tiles * TILE_PIXELS;
+            let tiles = &self.tiles[page.first..page.first + page.tiles];
+            let found: Vec<_> = self.gpu.read(&page.state, "bringing the state back", |words| {
+                let tile = |(i, tile): (usize, &TileId)| {
+                    let words = TileWords { words, stride, first: i * TILE_PIXELS };
+                    (*tile, look(*tile, self.port.restore(self.frame.grid, *tile, words)))
+                };
+                tiles.par_iter().enumerate().map(tile).collect()
+            })?;
+            all.extend(found);
+        }
+        Ok(all)
+    }
+
+    /// The picture: of the device's own sums where they are the plain text's, and else
+    /// resolved by the plain text.
+    ///
+    /// # Errors
+    /// As [`GpuRun::states`].
+    pub fn picture(&mut self) -> Result<Picture> {
+        let begun = Instant::now();
+        let grid = self.frame.grid;
+        let tiles = match &self.programs.resolve {
+            Some(program) => self.resolved(program)?,
+            None => self.states(|tile, state| self.port.plain.resolve(grid, tile, &state))?,
+        };
+        let mut finished: TileMap<TilePixels> = TileMap::new(grid);
+        for (tile, pixels) in tiles {
+            finished.get_or_insert_with(tile, || pixels);
+        }
+        self.seconds.device = self.timer.seconds(self.gpu)?;
+        self.seconds.back = begun.elapsed().as_secs_f64();
+        self.seconds.wall = self.start.elapsed().as_secs_f64();
+        Ok(Picture::from_tiles(self.frame.background.map(f64::from), finished))
+    }
+
+    fn resolved(&self, program: &wgpu::ComputePipeline) -> Result<Vec<(TileId, TilePixels)>> {
+        let mut all = Vec::with_capacity(self.tiles.len());
+        for (i, page) in self.pages.iter().enumerate() {
+            let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
+            let bytes = (12 * page.tiles * TILE_PIXELS) as u64;
+            let picture = self.gpu.buffer("the picture", bytes, usage)?;
+            self.run_on(i, "resolve", program, None, Some(&picture))?;
+            let tiles = &self.tiles[page.first..page.first + page.tiles];
+            self.gpu.read(&picture, "bringing the picture back", |words| {
+                for (tile, words) in tiles.iter().zip(words.chunks_exact(3 * TILE_PIXELS)) {
+                    let colour = |i: usize| f64::from(f32::from_bits(words[i]));
+                    let mut pixels: TilePixels = Box::new([[0.0; 3]; TILE_PIXELS]);
+                    for (i, pixel) in pixels.iter_mut().enumerate() {
+                        *pixel = std::array::from_fn(|c| colour(3 * i + c));
+                    }
+                    all.push((*tile, pixels));
+                }
+            })?;
+        }
+        Ok(all)
+    }
+}

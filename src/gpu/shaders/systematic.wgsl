@@ -1,0 +1,57 @@
+// Twin of src/design/systematic.rs: evenly spaced reference values.
+// uses: dither over_opaque replay resolve stochastic tracked
+
+// The last phase of the surface, and whether it has one. Where places are counted, ξ.
+var<private> phase: u32;
+var<private> begun: bool;
+// Where the fragment's samples start.
+var<private> start: u32;
+
+fn references_clear() {
+    if PHASE_SUM {
+        state_put(AT_PHASE, 0u);
+        state_put(AT_PHASE + 1u, 0u);
+    }
+}
+
+fn references_load() {
+    if PHASE_SUM {
+        phase = state_word(AT_PHASE);
+        begun = state_word(AT_PHASE + 1u) == 1u;
+    }
+}
+
+fn references_store() {
+    if PHASE_SUM {
+        state_put(AT_PHASE, phase);
+        state_put(AT_PHASE + 1u, select(0u, 1u, begun));
+    }
+}
+
+fn references_start() {
+    phase = 0u;
+    begun = false;
+}
+
+// Modulo 2^32: an opaque fragment's threshold, 2^32, leaves the phase as it is.
+fn references_begin(round: Round, key: ReferenceKey, opacity: Threshold, number: u32, count: u32) {
+    if count == 0u {
+        return;
+    }
+    // Rounds that are stratified together number their samples one after the other.
+    let earlier = opacity.low * (round.index * SAMPLES);
+    if PHASE_SUM {
+        if !begun {
+            phase = dither_value(site.x, site.y, key) + earlier;
+        }
+        start = phase;
+        phase += opacity.low * count;
+        begun = true;
+    } else {
+        start = dither_value(site.x, site.y, key) + earlier + opacity.low * number;
+    }
+}
+
+fn reference_of(round: Round, key: ReferenceKey, opacity: Threshold, number: u32, place: u32) -> u32 {
+    return start + opacity.low * (place + 1u);
+}
