@@ -187,6 +187,7 @@ impl OnDevice<Option<u32>> for Evenly {
         if let Some(ranks) = self.dither.ranks() {
             to.ranks(ranks);
         }
+        to.iterations(u32::BITS);
         // Whether there is one, behind it.
         to.field("PHASE", if self.phase == Phase::Sum { 2 } else { 0 });
     }

@@ -28,6 +28,7 @@ pub(super) struct Binner {
     bound: wgpu::ComputePipeline,
     scan: wgpu::ComputePipeline,
     add: wgpu::ComputePipeline,
+    longest: wgpu::ComputePipeline,
 }
 
 /// Rows sorted by pixel.
@@ -38,6 +39,8 @@ pub(super) struct Sorted {
     pub ends: wgpu::Buffer,
     /// How many pixels that are.
     pub pixels: u32,
+    /// How many rows a pixel has, at most.
+    pub longest: u32,
 }
 
 /// Memory that sorting needs and does not keep.
@@ -120,6 +123,11 @@ impl Binner {
             bound: gpu.pipeline(&bin, "bound", &layout)?,
             scan: gpu.pipeline(&scan, "scan", &scan_layout)?,
             add: gpu.pipeline(&scan, "add", &scan_layout)?,
+            longest: gpu.pipeline(
+                &shader::program("longest", samples, &[]),
+                "find",
+                &scan_layout,
+            )?,
             layout,
             scan_layout,
             touch_layout,
@@ -166,7 +174,8 @@ impl Binner {
     ) -> Result<Sorted> {
         let pixels = (touched * TILE_PIXELS) as u64;
         let usage = wgpu::BufferUsages::STORAGE;
-        let sorted = Sorted {
+        let mut sorted = Sorted {
+            longest: 0,
             rows: gpu.buffer("sorted rows", 4 * u64::from(chunk.params.rows), usage)?,
             ends: gpu.buffer("the pixels' rows", 8 * pixels, usage)?,
             pixels: pixels as u32,
@@ -230,7 +239,21 @@ impl Binner {
             pass.set_bind_group(0, &bound, &[]);
             dispatch(gpu, &mut pass, u64::from(chunk.params.rows).div_ceil(256));
         }
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
+        let longest = gpu.buffer("the longest list", 4, usage)?;
+        let length = [sorted.pixels, 0, 0, 0];
+        let params =
+            gpu.filled("parameters", bytemuck::bytes_of(&length), wgpu::BufferUsages::UNIFORM)?;
+        let buffers = [(0, &params), (1, &sorted.ends), (2, &longest)];
+        let bound = gpu.bind(&self.scan_layout, &buffers);
+        {
+            let mut pass = timer.pass(&mut encoder, "bin");
+            pass.set_pipeline(&self.longest);
+            pass.set_bind_group(0, &bound, &[]);
+            dispatch(gpu, &mut pass, pixels.div_ceil(256));
+        }
         gpu.submit(encoder, "sorting a chunk")?;
+        sorted.longest = gpu.read(&longest, "sorting a chunk", |words| words[0])?;
         Ok(sorted)
     }
 

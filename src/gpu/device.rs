@@ -291,10 +291,15 @@ impl Gpu {
         entry: &str,
         layout: &wgpu::BindGroupLayout,
     ) -> Result<wgpu::ComputePipeline> {
+        /// Programs that are kept: enough for some designs at some sample counts.
+        const KEPT: usize = 64;
         let key = (source.to_string(), entry.to_string());
         let mut pipelines = self.pipelines.lock().expect("no thread panicked");
         if let Some(pipeline) = pipelines.get(&key) {
             return Ok(pipeline.clone());
+        }
+        if pipelines.len() >= KEPT {
+            pipelines.clear();
         }
         let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some(entry),

@@ -46,10 +46,10 @@ mirrored! {
         height: u32,
         side_bits: u32,
         tile_columns: u32,
+        from_fragment: u32,
+        fragments: u32,
         digit_at: u32,
         blocks: u32,
-        /// To where a column may begin.
-        unused: [u32; 2],
         x: Column,
         y: Column,
         coverage: Column,

@@ -88,6 +88,11 @@ struct Programs {
     tables: wgpu::Buffer,
 }
 
+/// Loop iterations of a thread, at most. Mesa's software driver ends all loops of a thread
+/// without a word after 65535 of them, and others take a device for lost that is busy for
+/// seconds.
+const ITERATIONS: u32 = 60_000;
+
 /// Threads of a group of `shaders/replay.wgsl`.
 const GROUP: usize = 64;
 
@@ -252,15 +257,24 @@ impl<'a> GpuRun<'a> {
         Ok(Ready { uploaded, sorted })
     }
 
+    /// Draws a chunk, so many fragments of each pixel at a time that no driver loses
+    /// patience.
     fn draw(&self, chunk: &Ready) -> Result<()> {
-        self.for_all_pages("draw", |run| &run.programs.draw, Some(chunk))
+        let fragments = (ITERATIONS / (self.port.iterations + 1)).max(1);
+        for from in (0..chunk.sorted.longest).step_by(fragments as usize) {
+            let mut part = chunk.uploaded.params;
+            part.from_fragment = from;
+            part.fragments = fragments;
+            self.for_all_pages("draw", |run| &run.programs.draw, Some((chunk, part)))?;
+        }
+        Ok(())
     }
 
     fn for_all_pages(
         &self,
         name: &'static str,
         pipeline: impl Fn(&Self) -> &wgpu::ComputePipeline,
-        chunk: Option<&Ready>,
+        chunk: Option<(&Ready, Params)>,
     ) -> Result<()> {
         let mut pages = 0..self.pages.len();
         pages.try_for_each(|page| self.run_on(page, name, pipeline(self), chunk, None))
@@ -272,12 +286,12 @@ impl<'a> GpuRun<'a> {
         page: usize,
         name: &'static str,
         pipeline: &wgpu::ComputePipeline,
-        chunk: Option<&Ready>,
+        chunk: Option<(&Ready, Params)>,
         picture: Option<&wgpu::Buffer>,
     ) -> Result<()> {
         let Page { state, first, tiles } = &self.pages[page];
         let (first_pixel, pixels) = (first * TILE_PIXELS, tiles * TILE_PIXELS);
-        let known = chunk.map_or(usize::MAX, |chunk| chunk.sorted.pixels as usize);
+        let known = chunk.map_or(usize::MAX, |(chunk, _)| chunk.sorted.pixels as usize);
         let taken = pixels.min(known.saturating_sub(first_pixel));
         if taken == 0 {
             return Ok(());
@@ -287,8 +301,9 @@ impl<'a> GpuRun<'a> {
             first_pixel: first_pixel as u32,
             pixels: pixels as u32,
             taken: taken as u32,
-            ..chunk.map_or(self.params, |chunk| chunk.uploaded.params)
+            ..chunk.map_or(self.params, |(_, params)| params)
         };
+        let chunk = chunk.map(|(chunk, _)| chunk);
         let usage = wgpu::BufferUsages::STORAGE;
         // What is not there is not read.
         let (nothing, nowhere) =

@@ -22,6 +22,7 @@ files![
     "enderton",
     "fragment",
     "lk",
+    "longest",
     "mask_narrow",
     "mask_wide",
     "opacity",

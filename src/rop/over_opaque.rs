@@ -217,6 +217,7 @@ where
         to.field("HAS_OPAQUE", u32::from(first));
         to.field("OPAQUE_DEPTH", samples);
         to.field("OPAQUE_COLOUR", 3 * samples);
+        to.iterations(2 * samples);
         self.inner.declare(to);
     }
 

@@ -49,9 +49,21 @@ pub struct Declaration {
     constants: Vec<(String, Constant)>,
     fields: Vec<Field>,
     ranks: Option<&'static Ranks>,
+    iterations: u32,
+    samples: u32,
 }
 
 impl Declaration {
+    /// Samples per pixel.
+    pub fn samples(&self) -> u32 {
+        self.samples
+    }
+
+    /// Loop iterations that a fragment takes, at most.
+    pub fn iterations(&mut self, count: u32) {
+        self.iterations += count;
+    }
+
     /// A constant beside those of the parameters.
     pub fn constant(&mut self, name: &str, value: Constant) {
         self.constants.push((name.to_string(), value));
@@ -157,6 +169,8 @@ pub struct Port {
     pub fields: Vec<Field>,
     /// A threshold matrix.
     pub ranks: Option<&'static Ranks>,
+    /// Loop iterations that a fragment takes, at most.
+    pub iterations: u32,
     /// Whether the device's own resolve gives the plain text's bits: a box filter in
     /// single precision.
     pub resolves: bool,
@@ -177,7 +191,7 @@ impl Port {
     where
         D: Design + OnDevice<D::Pixel> + Clone + 'static,
     {
-        let mut declared = Declaration::default();
+        let mut declared = Declaration { samples: frame.samples(), ..Declaration::default() };
         design.declare(&mut declared);
         let mut constants = of_parameters(info.params, values);
         constants.push(("SAMPLES".to_string(), Constant::Whole(frame.samples())));
@@ -188,6 +202,7 @@ impl Port {
             constants,
             fields: declared.fields,
             ranks: declared.ranks,
+            iterations: declared.iterations,
             resolves: false,
             plain: Box::new(plain),
             restore: Box::new(move |grid, tile, tile_words, fields| {

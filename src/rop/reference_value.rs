@@ -53,6 +53,14 @@ impl Reference {
         }
     }
 
+    /// Loop iterations that a value takes.
+    pub(in crate::rop) fn iterations(self) -> u32 {
+        match self {
+            Reference::Owen | Reference::Sobol => u32::BITS,
+            _ => 0,
+        }
+    }
+
     /// Whether two surfaces of a pixel get unrelated values.
     pub fn scrambles(self) -> bool {
         !matches!(self, Reference::RadicalInverse | Reference::Sobol)

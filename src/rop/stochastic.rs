@@ -504,6 +504,8 @@ where
         to.field("TRANSMITTANCE", sums * samples);
         to.field("OCCUPIED", sums * samples.div_ceil(32));
         to.field("SUM", sums * 4);
+        // The depth test, writing or multiplying.
+        to.iterations(2 * samples);
         self.sampler.declare(to);
     }
 

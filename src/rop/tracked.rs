@@ -247,6 +247,8 @@ where
         to.field("NUMBERED", 1);
         // Whether there is one, behind it.
         to.field("LAST", if by_source { 2 } else { 0 });
+        // Each sample finds its place among all.
+        to.iterations(N as u32 * (N as u32 + 1));
         self.references.declare(to);
     }
 
@@ -264,6 +266,8 @@ where
 }
 
 impl OnDevice<()> for Hashed {
-    fn declare(&self, _: &mut Declaration) {}
+    fn declare(&self, to: &mut Declaration) {
+        to.iterations(self.0.iterations() * to.samples());
+    }
     fn read(&self, _: Site, _: &PixelWords<'_>) {}
 }

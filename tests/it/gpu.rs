@@ -90,7 +90,11 @@ fn check(name: &str, samples: u32) {
         fragments.extend(random_fragments(&header, 300, i as u32));
         let trace = trace(&header, &fragments);
         let frame = design.frame(&trace, samples, i as u32).unwrap();
-        eprintln!("{:?} {}", std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap(), design.label());
+        eprintln!(
+            "{:?} {}",
+            std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap(),
+            design.label()
+        );
         let expected = by_plain_text(&design, &trace, &frame);
         let found = on_gpu(gpu, &design, &trace, &frame, &GpuOptions::default());
         let label = design.label();

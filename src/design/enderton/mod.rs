@@ -307,6 +307,9 @@ impl<const N: usize> EndertonSampler<N> {
 
 impl<const N: usize> OnDevice<()> for EndertonSampler<N> {
     fn declare(&self, to: &mut Declaration) {
+        // Each sample finds its place among the slots of all rounds.
+        let slots = MAX_SLOTS as u32 / MAX_SAMPLES * N as u32;
+        to.iterations(slots * (N as u32 + 1));
         if let Some(ranks) = self.dither.ranks() {
             to.ranks(ranks);
         }

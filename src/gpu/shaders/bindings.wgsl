@@ -30,6 +30,9 @@ struct Params {
     // The frame's sides are at most this power of two.
     side_bits: u32,
     tile_columns: u32,
+    // The first of a pixel's fragments that is drawn now, and how many are at most.
+    from_fragment: u32,
+    fragments: u32,
     // The lowest bit of the digit that is sorted by, and the number of blocks of keys.
     digit_at: u32,
     blocks: u32,

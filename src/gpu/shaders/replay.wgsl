@@ -44,11 +44,13 @@ fn draw(
         return;
     }
     let range = ends[params.first_pixel + pixel];
-    if range.x >= range.y {
+    if range.y - range.x <= params.from_fragment {
         return;
     }
+    let first = range.x + params.from_fragment;
+    let end = first + min(range.y - first, params.fragments);
     load_pixel();
-    for (var i = range.x; i < range.y; i++) {
+    for (var i = first; i < end; i++) {
         let row = rows[i];
         draw_fragment(fragment(row), row);
     }
