@@ -5,8 +5,8 @@ use crate::error::Result;
 use crate::param::Values;
 use crate::rop::layers::{COVERAGE, LAYERS, Layer, Layering, contents};
 use crate::rop::{
-    Blueprint, Contents, Family, Frame, Info, OpaquePromise, OrderPromise, OverOpaque, Probe,
-    Promises, Site, StateBits, Transparent, over_opaque,
+    Blueprint, Contents, Declaration, Family, Frame, Info, OnDevice, OpaquePromise, OrderPromise,
+    OverOpaque, PixelWords, Port, Probe, Promises, Site, StateBits, Transparent, over_opaque,
 };
 use crate::trace::Fragment;
 
@@ -28,6 +28,13 @@ impl Blueprint for KBuffer {
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
         let inner = KBufferAt(Layering::of(values, frame));
         Ok(OverOpaque::new(frame, over_opaque::of(values), inner))
+    }
+
+    const PORTED: bool = true;
+
+    fn port<const N: usize>(values: &Values, frame: &Frame) -> Result<Option<Port>> {
+        let plain = Self::at::<N>(values, frame)?;
+        Ok(Some(Port::of("kbuffer", &Self::INFO, values, frame, plain)))
     }
 
     fn promises(values: &Values) -> Promises {
@@ -79,5 +86,15 @@ impl<const N: usize> Transparent<N> for KBufferAt<N> {
 
     fn contents(&self, layers: &Vec<Layer>) -> Contents {
         contents(layers)
+    }
+}
+
+impl<const N: usize> OnDevice<Vec<Layer>> for KBufferAt<N> {
+    fn declare(&self, to: &mut Declaration) {
+        self.0.declare(to);
+    }
+
+    fn read(&self, site: Site, from: &PixelWords<'_>) -> Vec<Layer> {
+        self.0.read(site, from)
     }
 }

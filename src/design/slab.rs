@@ -37,12 +37,13 @@ use crate::error::Result;
 use crate::param::{Param, Values};
 use crate::random::hash;
 use crate::rop::layers::{
-    COVERAGE, Columns, Coverage, Deep, LAYERS, Layer, composite, contents, insert, nearer, room,
+    self, COVERAGE, Columns, Coverage, Deep, LAYERS, Layer, composite, contents, insert, nearer,
+    room,
 };
 use crate::rop::{
-    Blueprint, Contents, Family, Frame, Info, Normalise, OpaquePromise, OrderPromise, OverOpaque,
-    Probe, Promises, Site, StateBits, Sums, Threshold, Transparent, over_opaque, random_subset,
-    visible_independent, visible_stratified,
+    Blueprint, Contents, Declaration, Family, Frame, Info, Normalise, OnDevice, OpaquePromise,
+    OrderPromise, OverOpaque, PixelWords, Port, Probe, Promises, Site, StateBits, Sums, Threshold,
+    Transparent, over_opaque, random_subset, visible_independent, visible_stratified,
 };
 use crate::trace::{Fragment, SampleMask, Unorm32};
 
@@ -123,6 +124,13 @@ impl Blueprint for Slab {
             layer_bits: 32 + columns.mask_bits() + frame.colour_bits + opacity_bits,
         };
         Ok(OverOpaque::new(frame, over_opaque::of(values), inner))
+    }
+
+    const PORTED: bool = true;
+
+    fn port<const N: usize>(values: &Values, frame: &Frame) -> Result<Option<Port>> {
+        let plain = Self::at::<N>(values, frame)?;
+        Ok(Some(Port::of("slab", &Self::INFO, values, frame, plain)))
     }
 
     fn promises(values: &Values) -> Promises {
@@ -391,5 +399,35 @@ impl<const N: usize> Transparent<N> for SlabAt<N> {
         }
         contents.fields.extend(pixel.sums.words(self.normalise));
         contents
+    }
+}
+
+impl<const N: usize> OnDevice<SlabPixel> for SlabAt<N> {
+    fn declare(&self, to: &mut Declaration) {
+        layers::declare(self.room, to);
+        let (room, columns, bits) = (self.room as u32, self.columns.count() as u32, self.bits);
+        let discrete = self.opacity == Opacity::Discrete;
+        to.field("BITS", if discrete { 2 * room } else { 0 });
+        let sums = u32::from(self.normalise != Normalise::None);
+        to.field("SUMMED", sums);
+        to.field("SUM", 4 * sums);
+        to.field("PASSES", columns * sums);
+        // What is seen behind the layers, before and after the fragment is among them; its
+        // bits, each held against all, or its probability.
+        let hidden = if self.hidden == Hidden::Removed { room + 1 } else { 0 };
+        to.iterations((columns + 1) * (room + 2) * (1 + hidden) + bits * (bits + 1).max(8));
+    }
+
+    fn read(&self, _: Site, from: &PixelWords<'_>) -> SlabPixel {
+        let words: Vec<u32> = from.field("BITS").collect();
+        let mut bits = words.chunks(2).map(|pair| u64::from(pair[1]) << 32 | u64::from(pair[0]));
+        let layer = |layer| SlabLayer { layer, bits: SampleMask(bits.next().unwrap_or_default()) };
+        SlabPixel {
+            layers: layers::read(from).into_iter().map(layer).collect(),
+            sums: match self.normalise {
+                Normalise::None => Sums::default(),
+                _ => Sums::read(self.normalise, from),
+            },
+        }
     }
 }

@@ -5,9 +5,9 @@
 use crate::error::Result;
 use crate::param::{Param, Values};
 use crate::rop::{
-    Accumulators, Blueprint, Contents, Coverage, Family, Frame, Info, OpaquePromise, OrderPromise,
-    OverOpaque, Probe, Promises, Site, StateBits, Transparent, ViewDepth, accumulators,
-    over_opaque, view_depth,
+    Accumulators, Blueprint, Contents, Coverage, Declaration, Family, Frame, Info, OnDevice,
+    OpaquePromise, OrderPromise, OverOpaque, PixelWords, Port, Probe, Promises, Site, StateBits,
+    Transparent, ViewDepth, accumulators, over_opaque, view_depth,
 };
 use crate::trace::{Fragment, Unorm32};
 
@@ -71,6 +71,13 @@ impl Blueprint for WeightedBlended {
             coverage: accumulators::of(values),
         };
         Ok(OverOpaque::new(frame, over_opaque::of(values), inner))
+    }
+
+    const PORTED: bool = true;
+
+    fn port<const N: usize>(values: &Values, frame: &Frame) -> Result<Option<Port>> {
+        let plain = Self::at::<N>(values, frame)?;
+        Ok(Some(Port::of("wboit", &Self::INFO, values, frame, plain)))
     }
 
     fn promises(values: &Values) -> Promises {
@@ -168,6 +175,32 @@ impl<const N: usize> Transparent<N> for WeightedBlendedAt<N> {
         let fields =
             vec![("weights", list(|s| s.weight)), ("transmittance", list(|s| s.transmittance))];
         Contents { samples: Vec::new(), fields }
+    }
+}
+
+impl<const N: usize> OnDevice<Accumulators<Sums>> for WeightedBlendedAt<N> {
+    fn declare(&self, to: &mut Declaration) {
+        let sums = self.coverage.sums(N) as u32;
+        to.field("TOUCHED", 1);
+        to.field("SUM_COLOUR", 3 * sums);
+        to.field("SUM_WEIGHT", sums);
+        to.field("SUM_THROUGH", sums);
+        to.iterations(sums);
+    }
+
+    fn read(&self, _: Site, from: &PixelWords<'_>) -> Accumulators<Sums> {
+        let mut colours = from.field("SUM_COLOUR").map(f32::from_bits);
+        let values = |name| from.field(name).map(f32::from_bits);
+        let sums = values("SUM_WEIGHT").zip(values("SUM_THROUGH"));
+        let sums = sums.map(|(weight, transmittance)| Sums {
+            colour: std::array::from_fn(|_| colours.next().expect("three a sum")),
+            weight,
+            transmittance,
+        });
+        match from.word("TOUCHED") {
+            0 => Accumulators::default(),
+            _ => Accumulators::from(sums.collect::<Vec<_>>()),
+        }
     }
 }
 

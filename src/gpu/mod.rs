@@ -13,5 +13,10 @@ mod replay;
 mod shader;
 mod time;
 
+/// The most by which a channel of a blending design's picture may differ from the plain
+/// text's, as a share of one plus its value: these designs compute in single precision
+/// here and in double precision there.
+pub const TOLERANCE: f64 = 1e-5;
+
 pub use device::{Adapter, Gpu};
 pub use replay::{GpuOptions, GpuRun, GpuSeconds};

@@ -55,6 +55,12 @@ impl Coverage {
 #[derive(Clone, Debug)]
 pub struct Accumulators<A>(Vec<A>);
 
+impl<A> From<Vec<A>> for Accumulators<A> {
+    fn from(sums: Vec<A>) -> Self {
+        Accumulators(sums)
+    }
+}
+
 impl<A> Default for Accumulators<A> {
     fn default() -> Self {
         Accumulators(Vec::new())

@@ -7,8 +7,9 @@
 //! sample, or a single one where coverage is but a share of alpha.
 
 use crate::param::{Param, Values};
-use crate::rop::design::{Contents, Frame, StateBits};
+use crate::rop::design::{Contents, Frame, Site, StateBits};
 use crate::rop::event::Probe;
+use crate::rop::port::{Declaration, OnDevice, PixelWords};
 use crate::trace::{Fragment, SampleMask, Unorm32};
 
 /// How many layers a pixel keeps.
@@ -237,6 +238,47 @@ impl<const N: usize> Layering<N> {
     /// The layers, near to far, over what lies behind them.
     pub fn resolve(&self, layers: &[Layer], behind: &[[f32; 3]; N]) -> [f64; 3] {
         self.columns.over(behind, |column| composite(layers, column))
+    }
+}
+
+/// Declares a device's room for layers: where there is a list of `room` of them.
+pub fn declare(room: usize, to: &mut Declaration) {
+    let (room, words) = (room as u32, to.samples().div_ceil(32));
+    to.field("LAYER_COUNT", 1);
+    to.field("LAYER_DEPTH", room);
+    to.field("LAYER_MASK", room * words);
+    to.field("LAYER_COLOUR", 3 * room);
+    to.field("LAYER_THROUGH", room);
+    // Bringing them in and out, finding a place, moving what lies behind.
+    to.iterations(4 * room);
+}
+
+/// The layers of a pixel that were declared so.
+pub fn read(from: &PixelWords<'_>) -> Vec<Layer> {
+    let masks: Vec<u32> = from.field("LAYER_MASK").collect();
+    let colours: Vec<f32> = from.field("LAYER_COLOUR").map(f32::from_bits).collect();
+    let mut through = from.field("LAYER_THROUGH").map(f32::from_bits);
+    let mut depths = from.field("LAYER_DEPTH").map(Unorm32);
+    let words = masks.len() / depths.len();
+    let layer = |i: usize| {
+        let mask = masks[i * words..(i + 1) * words].iter().rev();
+        Some(Layer {
+            depth: depths.next()?,
+            coverage: SampleMask(mask.fold(0, |mask, word| mask << 32 | u64::from(*word))),
+            colour: std::array::from_fn(|c| colours[3 * i + c]),
+            transmittance: through.next()?,
+        })
+    };
+    (0..from.word("LAYER_COUNT") as usize).map_while(layer).collect()
+}
+
+impl<const N: usize> OnDevice<Vec<Layer>> for Layering<N> {
+    fn declare(&self, to: &mut Declaration) {
+        declare(self.room, to);
+    }
+
+    fn read(&self, _: Site, from: &PixelWords<'_>) -> Vec<Layer> {
+        read(from)
     }
 }
 

@@ -3,6 +3,7 @@
 //! and 3.4; Sintorn and Assarsson 2009).
 
 use crate::rop::layers::Columns;
+use crate::rop::port::PixelWords;
 use crate::trace::SampleMask;
 
 crate::options! {
@@ -51,6 +52,17 @@ pub struct Sums {
 }
 
 impl Sums {
+    /// The sums as a device holds them: whether there are any, four, and the columns'.
+    pub fn read(normalise: Normalise, from: &PixelWords<'_>) -> Self {
+        if from.word("SUMMED") == 0 {
+            return Sums::default();
+        }
+        let [r, g, b, alpha] = from.reals("SUM");
+        let passes = from.field("PASSES").map(f32::from_bits);
+        let passes = if normalise.by_alpha() { passes.collect() } else { Vec::new() };
+        Sums { passes, colour: [r, g, b], alpha }
+    }
+
     /// Adds a fragment of which the columns that it covers show `visible`, all together.
     pub fn add(
         &mut self,

@@ -4,13 +4,14 @@
 use std::sync::OnceLock;
 
 use screendoor::design::{Configured, DESIGNS};
-use screendoor::gpu::{Gpu, GpuOptions, GpuRun};
+use screendoor::gpu::{self, Gpu, GpuOptions, GpuRun};
+use screendoor::picture::Picture;
 use screendoor::rop::{Contents, Frame, ReplayOptions, Told, Which};
-use screendoor::tile::{TileGrid, TileId};
-use screendoor::trace::{Block, Fragment, Header, Trace, WriteOptions};
+use screendoor::tile::TileId;
+use screendoor::trace::{Block, Fragment, Header, Trace};
 
 use crate::fast::crowd;
-use crate::util::{header, random_fragments, trace, trace_bytes, variants};
+use crate::util::{header, picture, random_fragments, trace, variants};
 
 /// The GPU, opened once; `None` where there is none and none is required.
 fn gpu() -> Option<&'static Gpu> {
@@ -128,4 +129,54 @@ fn systematic_is_its_plain_text() {
 #[test]
 fn enderton_is_its_plain_text() {
     check_counts("enderton");
+}
+
+/// Channels of a picture that differ from the plain text's by more than is allowed, and the
+/// most that any differs by.
+fn differing(found: &Picture, expected: &Picture) -> (usize, f64) {
+    let pixels = (0..expected.height()).flat_map(|y| (0..expected.width()).map(move |x| (x, y)));
+    let differences = pixels.flat_map(|(x, y)| {
+        let (found, expected) = (found.get(x, y), expected.get(x, y));
+        (0..3).map(move |i| (found[i] - expected[i]).abs() / (1.0 + expected[i].abs()))
+    });
+    differences.fold((0, 0.0), |(count, most), difference| {
+        // What is no number differs.
+        let beyond = !(difference <= gpu::TOLERANCE);
+        (count + usize::from(beyond), f64::max(most, difference))
+    })
+}
+
+fn check_blended(name: &str) {
+    let Some(gpu) = gpu() else { return };
+    let entry = DESIGNS.iter().find(|entry| entry.info.name == name).unwrap();
+    for samples in [1, 8, 32, 64] {
+        let header = Header { background: [0.1, 0.2, 0.3], ..header(40, 40, samples) };
+        for (i, design) in variants(entry).into_iter().enumerate() {
+            let mut fragments = crowd(&header, 60, i as u32);
+            fragments.extend(random_fragments(&header, 6000, i as u32));
+            let trace = trace(&header, &fragments);
+            let (found, _) =
+                design.replay_on(gpu, &trace, samples, 7, &GpuOptions::default()).unwrap();
+            let expected = picture(&design, &trace, samples, 7);
+            let found = differing(&found.picture, &expected);
+            eprintln!("{} {samples}: {found:?}", design.label());
+        }
+    }
+}
+
+#[test]
+fn kbuffer() {
+    check_blended("kbuffer");
+}
+#[test]
+fn mlab() {
+    check_blended("mlab");
+}
+#[test]
+fn wboit() {
+    check_blended("wboit");
+}
+#[test]
+fn slab() {
+    check_blended("slab");
 }
