@@ -12,6 +12,7 @@ use crate::design::{Configured, configure};
 use crate::error::{Error, Result};
 use crate::param::{Options, parse_setting};
 use crate::scene;
+use crate::study::engine::EngineName;
 use crate::trace::{SamplePattern, Trace};
 
 /// A parser for an enumeration of [`Options`]: the names and helps are its own.
@@ -21,6 +22,31 @@ pub(super) fn option<C: Options + Send + Sync>() -> impl TypedValueParser<Value 
         let index = C::CHOICES.iter().position(|c| c.name == name);
         C::ALL[index.expect("the parser lets only the names pass")]
     })
+}
+
+/// A parser for an engine's name.
+pub(super) fn engine_name() -> impl TypedValueParser<Value = EngineName> {
+    let values = EngineName::all().map(|(_, c)| PossibleValue::new(c.name).help(c.help));
+    PossibleValuesParser::new(values).map(|name| {
+        let named = EngineName::all().find(|(_, c)| c.name == name);
+        named.expect("the parser lets only the names pass").0
+    })
+}
+
+/// The designs of a list such as `lk,slab:layers=4,bits=8,enderton`: what is a setting and
+/// names no design belongs to the one before.
+pub(super) fn design_list(text: &str) -> Result<Vec<Configured>> {
+    let mut specs: Vec<String> = Vec::new();
+    for part in text.split(',') {
+        match specs.last_mut() {
+            Some(spec) if part.contains('=') && !part.contains(':') => {
+                spec.push(if spec.contains(':') { ',' } else { ':' });
+                spec.push_str(part);
+            }
+            _ => specs.push(part.to_string()),
+        }
+    }
+    specs.iter().map(|spec| configure(spec, &[])).collect()
 }
 
 /// Reads `WIDTHxHEIGHT`.
@@ -124,6 +150,14 @@ impl RunArguments {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn settings_belong_to_the_design_before() {
+        let list = design_list("lk,slab:layers=4,bits=8,enderton:mask=naive").unwrap();
+        let labels: Vec<String> = list.iter().map(Configured::label).collect();
+        assert_eq!(labels, ["lk", "slab:layers=4,bits=8", "enderton:mask=naive"]);
+        assert!(design_list("lk,nothing").is_err());
+    }
 
     #[test]
     fn sizes_and_numbers() {

@@ -13,6 +13,7 @@ mod replay;
 mod reproduce;
 mod scenes;
 mod signals;
+mod throughput;
 mod verify;
 
 use std::process::ExitCode;
@@ -48,6 +49,7 @@ enum Command {
     Explain(explain::Arguments),
     Designs(designs::Arguments),
     Scenes(scenes::Arguments),
+    Throughput(throughput::Arguments),
     Verify(verify::Arguments),
     Reproduce(reproduce::Arguments),
 }
@@ -85,6 +87,7 @@ fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         Command::Explain(a) => explain::run(a, console),
         Command::Designs(a) => designs::run(a, console),
         Command::Scenes(a) => scenes::run(a, console),
+        Command::Throughput(a) => throughput::run(a, console),
         Command::Verify(a) => verify::run(a, console),
         Command::Reproduce(a) => reproduce::run(a, console),
     }

@@ -6,7 +6,7 @@ use std::time::Instant;
 use clap::Args;
 use serde::Serialize;
 
-use crate::cli::arguments::{RunArguments, option};
+use crate::cli::arguments::{RunArguments, engine_name};
 use crate::cli::console::{Console, grouped, shown};
 use crate::cli::files::{Json, check, report, write_pictures};
 use crate::design::{Configured, REFERENCE, configure};
@@ -14,7 +14,8 @@ use crate::error::Result;
 use crate::metrics::{Ensemble, EnsembleErrors, PixelClasses, Region};
 use crate::param::Values;
 use crate::picture::{Picture, PictureFile};
-use crate::rop::{EventCounts, Promises, ReplayOptions, Replayed, StateBits, Which};
+use crate::rop::{EventCounts, Promises, ReplayOptions, Replayed, StateBits};
+use crate::study::engine::{EngineName, OnGpu};
 use crate::trace::Trace;
 
 /// Replay a trace through a design: a picture, its error, what the ROP did
@@ -35,9 +36,13 @@ pub(super) struct Arguments {
     /// Write the results as JSON to a file, or to standard output for -
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Which implementation draws; all give the same bits
-    #[arg(long, default_value = "fast", value_name = "ENGINE", value_parser = option::<Which>())]
-    engine: Which,
+    /// What draws; all give the same bits, but that a GPU computes in single precision
+    /// where a design blends
+    #[arg(long, default_value = "fast", value_name = "ENGINE", value_parser = engine_name())]
+    engine: EngineName,
+    /// The GPU to use: a part of its name or of its driver's
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
     /// MiB that the exact answer's fragments may take at a time
     #[arg(long, default_value_t = 512, value_name = "MIB", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=1 << 20))]
     memory: u64,
@@ -56,7 +61,8 @@ struct Document<'a> {
     promises: Promises,
     samples: u32,
     seed: u32,
-    engine: Which,
+    engine: EngineName,
+    gpu: &'a Option<OnGpu>,
     /// Of the first seed's picture: equal hashes are equal pictures.
     picture: String,
     seconds: f64,
@@ -64,7 +70,10 @@ struct Document<'a> {
     passes: u32,
     state_bits: StateBits,
     touched_tiles: usize,
-    events: &'a EventCounts,
+    /// Drawn, over all passes.
+    fragments: u64,
+    /// A GPU counts none.
+    events: Option<&'a EventCounts>,
     errors: Option<ErrorsByRegion>,
 }
 
@@ -80,6 +89,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let outputs: Vec<&Path> = arguments.output.iter().map(|o| &**o).chain(json).collect();
     check(&[arguments.run.path()], &outputs)?;
     let (design, trace, samples) = arguments.run.open(console)?;
+    let engine = arguments.engine.open(arguments.adapter.as_deref())?;
     let header = trace.header();
     let create = |path| PictureFile::create(path, header.width, header.height);
     let mut files = arguments.output.iter().map(create).collect::<Result<Vec<_>>>()?;
@@ -88,15 +98,15 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let progress = console.progress("replaying", "fragments");
     let watch = |done, total| progress.set(done, total);
     let options = ReplayOptions {
-        engine: arguments.engine,
         count_events: true,
         window: arguments.window as usize,
         memory: arguments.memory << 20,
         progress: &watch,
+        ..ReplayOptions::default()
     };
 
     let start = Instant::now();
-    let first = design.replay(&trace, samples, seed, &options)?;
+    let (first, gpu) = engine.replay(&design, &trace, samples, seed, &options)?;
     let seconds = start.elapsed().as_secs_f64();
 
     let reference = if arguments.exact || arguments.seeds > 1 {
@@ -112,7 +122,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
                 progress.name(&format!("seed {} of {}", i + 1, arguments.seeds));
                 let seed = seed.wrapping_add(i);
                 let plain = ReplayOptions { count_events: false, ..options };
-                Ok(design.replay(&trace, samples, seed, &plain)?.picture)
+                Ok(engine.replay(&design, &trace, samples, seed, &plain)?.0.picture)
             });
             Some(by_region(&trace, samples, reference, &first.picture, pictures)?)
         }
@@ -122,7 +132,9 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     // No file appears unless all could be written.
     let saved = write_pictures(&mut files, &first.picture, reference.as_ref())
         .and_then(|()| files.into_iter().try_for_each(PictureFile::commit));
-    let events = first.events.clone().unwrap_or_default();
+    let drawn = |gpu: &OnGpu| gpu.fragments;
+    let counted = first.events.as_ref().map_or(0, |events| events.fragments);
+    let fragments = gpu.as_ref().map_or(counted, drawn);
     let document = Document {
         trace: trace.place(),
         content: trace.content(),
@@ -132,13 +144,15 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         samples,
         seed,
         engine: arguments.engine,
+        gpu: &gpu,
         picture: first.picture.hash(),
         seconds,
-        fragments_per_second: events.fragments as f64 / seconds,
+        fragments,
+        fragments_per_second: fragments as f64 / seconds,
         passes: first.passes,
         state_bits: first.state_bits,
         touched_tiles: first.touched_tiles,
-        events: &events,
+        events: first.events.as_ref(),
         errors,
     };
     let reported = report(json, &document, console, || {
@@ -149,7 +163,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         if let Some(errors) = &document.errors {
             print_errors(errors, console)?;
         }
-        print_events(&first, &events, &design, console)
+        print_events(&first, &design, console)
     });
     saved.and(reported)
 }
@@ -173,21 +187,35 @@ fn by_region(
 }
 
 fn print_speed(document: &Document<'_>, rows: u64, console: &Console) -> Result<()> {
-    let drawn = document.events.fragments;
+    let drawn = document.fragments;
     console.print(format_args!(
         "{} fragments in {:.2} s ({:.2} million a second)",
         grouped(drawn),
         document.seconds,
         document.fragments_per_second / 1e6
     ))?;
-    if drawn == rows {
+    if let Some(gpu) = document.gpu {
+        print_gpu(gpu, console)?;
+    }
+    if drawn == rows * u64::from(document.passes) {
         return Ok(());
     }
     console.print(format_args!(
         "(of {}: the others cover none of the first {} samples)",
-        grouped(rows),
+        grouped(rows * u64::from(document.passes)),
         document.samples
     ))
+}
+
+fn print_gpu(gpu: &OnGpu, console: &Console) -> Result<()> {
+    console.print(format_args!("on {}", shown(gpu.adapter.to_string())))?;
+    let ms = |seconds: f64| format!("{:.1} ms", seconds * 1e3);
+    let seconds = &gpu.seconds;
+    let mut parts =
+        vec![format!("upload {}", ms(seconds.upload)), format!("back {}", ms(seconds.back))];
+    let device = seconds.device.iter().flatten();
+    parts.extend(device.map(|(name, s)| format!("{name} {} by its own clock", ms(*s))));
+    console.print(format_args!("  {}", parts.join(", ")))
 }
 
 fn print_errors(errors: &ErrorsByRegion, console: &Console) -> Result<()> {
@@ -222,12 +250,26 @@ fn print_errors(errors: &ErrorsByRegion, console: &Console) -> Result<()> {
     Ok(())
 }
 
-fn print_events(
-    replayed: &Replayed,
-    events: &EventCounts,
-    design: &Configured,
-    console: &Console,
-) -> Result<()> {
+fn print_events(replayed: &Replayed, design: &Configured, console: &Console) -> Result<()> {
+    match &replayed.events {
+        Some(events) => print_counts(events, console)?,
+        None => {
+            console.print(format_args!("events are not counted on a GPU: use --engine fast"))?
+        }
+    }
+    let bits = replayed.state_bits;
+    let size = if bits.unbounded {
+        "grows with the fragments".to_string()
+    } else {
+        format!("{} bits: {} of samples, {} beside", bits.total(), bits.samples, bits.extra)
+    };
+    console.print(format_args!("state per pixel         {size}"))?;
+    console.print(format_args!("passes over the trace   {}", replayed.passes))?;
+    let promises = design.promises();
+    console.print(format_args!("promises                {}", promises.words().join(", ")))
+}
+
+fn print_counts(events: &EventCounts, console: &Console) -> Result<()> {
     let per = |n: u64| n as f64 / events.fragments.max(1) as f64;
     let line = |name: &str, n: u64| {
         console.print(format_args!("  {name:<22}{:>18}{:>12.3}", grouped(n), per(n)))
@@ -244,15 +286,5 @@ fn print_events(
     line("surfaces started", events.surfaces)?;
     let [read, written] = events.state_bytes();
     line("state bytes read", read)?;
-    line("state bytes written", written)?;
-    let bits = replayed.state_bits;
-    let size = if bits.unbounded {
-        "grows with the fragments".to_string()
-    } else {
-        format!("{} bits: {} of samples, {} beside", bits.total(), bits.samples, bits.extra)
-    };
-    console.print(format_args!("state per pixel         {size}"))?;
-    console.print(format_args!("passes over the trace   {}", replayed.passes))?;
-    let promises = design.promises();
-    console.print(format_args!("promises                {}", promises.words().join(", ")))
+    line("state bytes written", written)
 }

@@ -75,7 +75,7 @@ impl Blueprint for LaineKarras {
 
     fn port<const N: usize>(values: &Values, frame: &Frame) -> Result<Option<Port>> {
         let plain = Self::at::<N>(values, frame)?;
-        Ok(Some(stochastic::port("lk", &Self::INFO, values, frame, plain)))
+        Ok(Some(stochastic::port(("lk", true), &Self::INFO, values, frame, plain)))
     }
 
     fn promises(values: &Values) -> Promises {

@@ -196,6 +196,11 @@ impl Configured {
         format!("{}{separator}{changes}", self.entry.info.name)
     }
 
+    /// Whether it has a port to GPUs.
+    pub fn is_ported(&self) -> bool {
+        self.entry.ported
+    }
+
     /// What it promises.
     pub fn promises(&self) -> Promises {
         (self.entry.promises)(&self.values)
@@ -233,7 +238,8 @@ impl Configured {
         })
     }
 
-    /// Replays `trace` on a GPU.
+    /// Replays `trace` on a GPU: the result, where the time went, and how many fragments
+    /// were drawn over all passes.
     ///
     /// # Errors
     /// As [`Configured::port`], [`Frame::of`] and [`GpuRun::new`].
@@ -244,7 +250,7 @@ impl Configured {
         samples: u32,
         seed: u32,
         options: &GpuOptions<'_>,
-    ) -> Result<(Replayed, GpuSeconds)> {
+    ) -> Result<(Replayed, GpuSeconds, u64)> {
         let frame = self.frame(trace, samples, seed)?;
         let port = self.port(&frame)?;
         let mut run = GpuRun::new(gpu, &port, &frame, trace, options)?;
@@ -256,7 +262,7 @@ impl Configured {
             passes: port.plain.passes(),
             touched_tiles: run.touched_tiles(),
         };
-        Ok((replayed, run.seconds().clone()))
+        Ok((replayed, run.seconds().clone(), run.fragments()))
     }
 
     /// Replays one pixel and writes down what happens.

@@ -97,7 +97,7 @@ impl Blueprint for Systematic {
 
     fn port<const N: usize>(values: &Values, frame: &Frame) -> Result<Option<Port>> {
         let plain = Self::at::<N>(values, frame)?;
-        Ok(Some(stochastic::port("systematic", &Self::INFO, values, frame, plain)))
+        Ok(Some(stochastic::port(("systematic", true), &Self::INFO, values, frame, plain)))
     }
 
     fn promises(values: &Values) -> Promises {

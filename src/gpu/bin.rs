@@ -41,6 +41,8 @@ pub(super) struct Sorted {
     pub pixels: u32,
     /// How many rows a pixel has, at most.
     pub longest: u32,
+    /// How many rows there are of all pixels.
+    pub kept: u32,
 }
 
 /// Memory that sorting needs and does not keep.
@@ -59,7 +61,9 @@ impl Scratch {
     /// # Errors
     /// As [`Gpu::buffer`].
     pub fn new(gpu: &Gpu, rows: usize) -> Result<Self> {
-        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
+        let usage = wgpu::BufferUsages::STORAGE
+            | wgpu::BufferUsages::COPY_SRC
+            | wgpu::BufferUsages::COPY_DST;
         let words = |label, count: u64| gpu.buffer(label, 4 * count, usage);
         let rows = rows as u64;
         let mut length = counted(rows);
@@ -107,9 +111,11 @@ impl Binner {
         ]);
         let scan_layout = buffers(&[(0, Uniform), (1, Write), (2, Write)]);
         let touch_layout = buffers(&[(0, Uniform), (1, Read), (3, Write)]);
-        let (bin, scan) =
-            (shader::program("bin", samples, constants), shader::program("scan", samples, &[]));
-        let touch = shader::program("touch", samples, constants);
+        let (bin, scan) = (
+            shader::program(&["bin"], samples, constants),
+            shader::program(&["scan"], samples, &[]),
+        );
+        let touch = shader::program(&["touch"], samples, constants);
         Ok(Binner {
             touch: gpu.pipeline(&touch, "touch", &touch_layout)?,
             first: [
@@ -124,7 +130,7 @@ impl Binner {
             scan: gpu.pipeline(&scan, "scan", &scan_layout)?,
             add: gpu.pipeline(&scan, "add", &scan_layout)?,
             longest: gpu.pipeline(
-                &shader::program("longest", samples, &[]),
+                &shader::program(&["longest"], samples, &[]),
                 "find",
                 &scan_layout,
             )?,
@@ -176,6 +182,7 @@ impl Binner {
         let usage = wgpu::BufferUsages::STORAGE;
         let mut sorted = Sorted {
             longest: 0,
+            kept: 0,
             rows: gpu.buffer("sorted rows", 4 * u64::from(chunk.params.rows), usage)?,
             ends: gpu.buffer("the pixels' rows", 8 * pixels, usage)?,
             pixels: pixels as u32,
@@ -239,8 +246,10 @@ impl Binner {
             pass.set_bind_group(0, &bound, &[]);
             dispatch(gpu, &mut pass, u64::from(chunk.params.rows).div_ceil(256));
         }
-        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
-        let longest = gpu.buffer("the longest list", 4, usage)?;
+        let usage = wgpu::BufferUsages::STORAGE
+            | wgpu::BufferUsages::COPY_SRC
+            | wgpu::BufferUsages::COPY_DST;
+        let longest = gpu.buffer("the longest list", 8, usage)?;
         let length = [sorted.pixels, 0, 0, 0];
         let params =
             gpu.filled("parameters", bytemuck::bytes_of(&length), wgpu::BufferUsages::UNIFORM)?;
@@ -252,8 +261,11 @@ impl Binner {
             pass.set_bind_group(0, &bound, &[]);
             dispatch(gpu, &mut pass, pixels.div_ceil(256));
         }
+        let behind = 4 * u64::from(chunk.params.rows);
+        encoder.copy_buffer_to_buffer(&scratch.keys[last], behind, &longest, 4, 4);
         gpu.submit(encoder, "sorting a chunk")?;
-        sorted.longest = gpu.read(&longest, "sorting a chunk", |words| words[0])?;
+        let found = gpu.read(&longest, "sorting a chunk", |words| [words[0], words[1]])?;
+        [sorted.longest, sorted.kept] = found;
         Ok(sorted)
     }
 

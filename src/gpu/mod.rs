@@ -19,4 +19,4 @@ mod time;
 pub const TOLERANCE: f64 = 1e-5;
 
 pub use device::{Adapter, Gpu};
-pub use replay::{GpuOptions, GpuRun, GpuSeconds};
+pub use replay::{GpuOptions, GpuRun, GpuSeconds, Threads};

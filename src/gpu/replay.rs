@@ -19,9 +19,20 @@ use crate::rop::{Frame, Port, TileState, TileWords};
 use crate::tile::{TILE_PIXELS, TileId, TileMap};
 use crate::trace::Trace;
 
+crate::options! {
+    /// What a thread is given.
+    pub enum Threads {
+        Auto = "auto": "what measures faster at the sample count",
+        Pixel = "pixel": "a pixel",
+        Sample = "sample": "a sample, where the design is for it; those of a pixel work together",
+    }
+}
+
 /// How to replay on a GPU; none of it changes the picture.
 #[derive(Clone, Copy)]
 pub struct GpuOptions<'a> {
+    /// What a thread is given.
+    pub threads: Threads,
     /// Rows of a chunk, at most; fewer where a buffer holds fewer.
     pub rows: u64,
     /// Bytes of chunks that stay on the device for the next pass.
@@ -32,7 +43,8 @@ pub struct GpuOptions<'a> {
 
 impl Default for GpuOptions<'_> {
     fn default() -> Self {
-        GpuOptions { rows: u64::MAX, resident: 1 << 31, progress: &|_, _| () }
+        let threads = Threads::Auto;
+        GpuOptions { threads, rows: u64::MAX, resident: 1 << 31, progress: &|_, _| () }
     }
 }
 
@@ -60,6 +72,8 @@ pub struct GpuRun<'a> {
     pages: Vec<Page>,
     /// The touched tiles, in the order of their places.
     tiles: Vec<TileId>,
+    /// Fragments drawn, over all passes.
+    fragments: u64,
     seconds: GpuSeconds,
     start: Instant,
 }
@@ -83,6 +97,9 @@ struct Programs {
     layout: wgpu::BindGroupLayout,
     clear: wgpu::ComputePipeline,
     draw: wgpu::ComputePipeline,
+    /// Pixels that a group draws, and how many fragments of each at a time.
+    drawn: usize,
+    fragments: u32,
     end_pass: wgpu::ComputePipeline,
     resolve: Option<wgpu::ComputePipeline>,
     tables: wgpu::Buffer,
@@ -97,8 +114,15 @@ const ITERATIONS: u32 = 60_000;
 const GROUP: usize = 64;
 
 impl Programs {
-    fn new(gpu: &Gpu, port: &Port, frame: &Frame, chunks: &Chunks) -> Result<Self> {
-        let source = source(port, frame.samples(), chunks);
+    fn new(
+        gpu: &Gpu,
+        port: &Port,
+        frame: &Frame,
+        chunks: &Chunks,
+        threads: Threads,
+    ) -> Result<Self> {
+        let samples = frame.samples();
+        let source = source(&[port.program], port, samples, chunks);
         use Access::{Read, Uniform, Write};
         let bindings = [Uniform, Read, Read, Write, Read, Read, Read, Write];
         let bindings = bindings.iter().enumerate();
@@ -106,9 +130,25 @@ impl Programs {
             bindings.map(|(i, access)| Binding { number: i as u32, access: *access }).collect();
         let layout = gpu.layout(&bindings);
         let program = |entry| gpu.pipeline(&source, entry, &layout);
+        let lanes = match threads {
+            Threads::Auto => by_sample(samples),
+            Threads::Pixel => false,
+            Threads::Sample => true,
+        };
+        let (draw, drawn, iterations) = if lanes && port.by_sample {
+            let file = lanes_file(gpu, samples);
+            let source = self::source(&[port.program, file], port, samples, chunks);
+            // Two loops over the samples, and what a reference value may take.
+            let iterations = 2 * samples + u32::BITS;
+            (gpu.pipeline(&source, "draw_lanes", &layout)?, GROUP / samples as usize, iterations)
+        } else {
+            (program("draw")?, GROUP, port.iterations)
+        };
         Ok(Programs {
             clear: program("clear")?,
-            draw: program("draw")?,
+            draw,
+            drawn,
+            fragments: (ITERATIONS / (iterations + 1)).max(1),
             end_pass: program("end_pass")?,
             resolve: if port.resolves { Some(program("resolve")?) } else { None },
             tables: gpu.filled(
@@ -121,12 +161,28 @@ impl Programs {
     }
 }
 
+/// Whether threads are better given samples than pixels, as measured (docs/PERFORMANCE.md).
+fn by_sample(samples: u32) -> bool {
+    samples >= 32
+}
+
+/// How the threads of a pixel look at each other's values.
+fn lanes_file(gpu: &Gpu, samples: u32) -> &'static str {
+    let [least, most] = gpu.adapter().subgroup;
+    // A group must be made of whole subgroups, and these of whole pixels.
+    let fits = |size: u32| size >= samples && size <= GROUP as u32 && size.is_power_of_two();
+    match gpu.has_subgroups() && fits(least) && fits(most) {
+        true => "lanes_subgroup",
+        false => "lanes_workgroup",
+    }
+}
+
 /// The text of a design's program for a trace's columns.
-fn source(port: &Port, samples: u32, chunks: &Chunks) -> String {
+fn source(files: &[&str], port: &Port, samples: u32, chunks: &Chunks) -> String {
     let mut constants = port.constants.clone();
     constants.extend(chunks.types());
     constants.extend(port.places());
-    shader::program(port.program, samples, &constants)
+    shader::program(files, samples, &constants)
 }
 
 /// The samples' places and what else the design asks for.
@@ -159,10 +215,11 @@ impl<'a> GpuRun<'a> {
             port,
             frame,
             params: Params::of(frame),
-            programs: Programs::new(gpu, port, frame, &chunks)?,
+            programs: Programs::new(gpu, port, frame, &chunks, options.threads)?,
             timer: Timer::new(gpu)?,
             pages: Vec::new(),
             tiles: Vec::new(),
+            fragments: 0,
             seconds: GpuSeconds::default(),
             start,
         };
@@ -201,6 +258,7 @@ impl<'a> GpuRun<'a> {
                 };
                 let ready = fresh.as_ref().or_else(|| kept[i].as_ref()).expect("one of the two");
                 self.draw(ready)?;
+                self.fragments += u64::from(ready.sorted.kept);
                 if pass == 0 && passes > 1 {
                     let fits = chunks.bytes(i) <= left;
                     left -= if fits { chunks.bytes(i) } else { 0 };
@@ -260,7 +318,7 @@ impl<'a> GpuRun<'a> {
     /// Draws a chunk, so many fragments of each pixel at a time that no driver loses
     /// patience.
     fn draw(&self, chunk: &Ready) -> Result<()> {
-        let fragments = (ITERATIONS / (self.port.iterations + 1)).max(1);
+        let fragments = self.programs.fragments;
         for from in (0..chunk.sorted.longest).step_by(fragments as usize) {
             let mut part = chunk.uploaded.params;
             part.from_fragment = from;
@@ -326,7 +384,8 @@ impl<'a> GpuRun<'a> {
             let mut pass = self.timer.pass(&mut encoder, name);
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, &bound, &[]);
-            dispatch(self.gpu, &mut pass, taken.div_ceil(GROUP) as u64);
+            let each = if name == "draw" { self.programs.drawn } else { GROUP };
+            dispatch(self.gpu, &mut pass, taken.div_ceil(each) as u64);
         }
         self.gpu.submit(encoder, name)
     }
@@ -334,6 +393,11 @@ impl<'a> GpuRun<'a> {
     /// How many tiles hold a fragment.
     pub fn touched_tiles(&self) -> usize {
         self.tiles.len()
+    }
+
+    /// How many fragments were drawn; over several passes each counts several times.
+    pub fn fragments(&self) -> u64 {
+        self.fragments
     }
 
     /// Where the time went, until now.

@@ -22,6 +22,9 @@ files![
     "enderton",
     "fragment",
     "kbuffer",
+    "lanes",
+    "lanes_subgroup",
+    "lanes_workgroup",
     "layers",
     "lk",
     "longest",
@@ -51,19 +54,19 @@ files![
     "wide",
 ];
 
-/// The text of the program that begins with file `main`: `constants`, then the files that
-/// it uses, each once and before its users. `mask` stands for the file that holds sets of
-/// up to `samples` samples.
+/// The text of the program that `files` are, with those that they use, each once and before
+/// its users, behind `constants`. `mask` stands for the file that holds sets of up to
+/// `samples` samples.
 ///
 /// # Panics
 /// Where a file is missing: a fault of the crate's own.
-pub fn program(main: &str, samples: u32, constants: &[(String, Constant)]) -> String {
+pub fn program(files: &[&str], samples: u32, constants: &[(String, Constant)]) -> String {
     let mut text = String::new();
     for (name, value) in constants {
         writeln!(text, "const {name}: {value};").expect("strings can be written to");
     }
     let mut done = Vec::new();
-    append(main, samples, &mut done, &mut text);
+    files.iter().for_each(|file| append(file, samples, &mut done, &mut text));
     text
 }
 
@@ -98,13 +101,13 @@ mod tests {
     #[test]
     fn a_file_is_put_in_once_and_before_its_users() {
         let constants = [("SAMPLES".to_string(), Constant::Whole(8))];
-        let text = program("touch", 8, &constants);
+        let text = program(&["touch"], 8, &constants);
         assert!(text.starts_with("const SAMPLES: u32 = 8u;\n"));
         assert_eq!(text.matches("struct Fragment {").count(), 1);
         assert!(text.contains("alias Mask = u32;") && !text.contains("alias Mask = Wide;"));
         let place = |part: &str| text.find(part).expect(part);
         assert!(place("struct Params {") < place("fn touch("));
-        assert!(program("touch", 64, &constants).contains("alias Mask = Wide;"));
+        assert!(program(&["touch"], 64, &constants).contains("alias Mask = Wide;"));
     }
 
     #[test]

@@ -171,6 +171,8 @@ pub struct Port {
     pub ranks: Option<&'static Ranks>,
     /// Loop iterations that a fragment takes, at most.
     pub iterations: u32,
+    /// Whether threads may be given samples in place of pixels.
+    pub by_sample: bool,
     /// Whether the device's own resolve gives the plain text's bits: a box filter in
     /// single precision.
     pub resolves: bool,
@@ -203,6 +205,7 @@ impl Port {
             fields: declared.fields,
             ranks: declared.ranks,
             iterations: declared.iterations,
+            by_sample: false,
             resolves: false,
             plain: Box::new(plain),
             restore: Box::new(move |grid, tile, tile_words, fields| {

@@ -168,9 +168,10 @@ pub fn single_pass<S: Sampler<N>, const N: usize>(
     OverOpaque::new(frame, Opaque::Together, methods)
 }
 
-/// The port of a design made by [`with_methods`]: without sums, a device resolves it.
+/// The port of a design made by [`with_methods`]: without sums, a device resolves it, and
+/// may give each sample a thread, where the design is for it.
 pub fn port<S, const N: usize>(
-    program: &'static str,
+    (program, by_sample): (&'static str, bool),
     info: &Info,
     values: &Values,
     frame: &Frame,
@@ -183,6 +184,7 @@ where
     let resolves = !plain.inner.has_sums();
     let mut port = Port::of(program, info, values, frame, plain);
     port.resolves = resolves;
+    port.by_sample = resolves && by_sample;
     port
 }
 

@@ -1,7 +1,9 @@
 //! From a trace and a plan to measured records: what every report is made of.
 
 pub mod comparison;
+pub mod engine;
 pub mod publications;
+pub mod throughput;
 
 use std::time::Instant;
 

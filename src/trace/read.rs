@@ -197,6 +197,11 @@ impl Trace {
         self.inner.seal.as_ref().map(|s| s.content.as_str())
     }
 
+    /// Bytes of a fragment's stored columns, before compression.
+    pub fn bytes_per_row(&self) -> u64 {
+        self.columns().iter().map(|(_, value_type)| value_type.bytes() as u64).sum()
+    }
+
     /// How many batches it holds.
     pub fn batch_count(&self) -> usize {
         self.inner.blocks.len()

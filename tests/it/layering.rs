@@ -20,7 +20,7 @@ const FLOW: &[(&str, &[&str])] = &[
     ("gpu", &["trace", "picture", "rop"]),
     ("design", &["rop", "trace", "resolve", "gpu"]),
     ("metrics", &["trace", "picture"]),
-    ("study", &["scene", "capture", "trace", "rop", "design", "metrics", "picture"]),
+    ("study", &["scene", "capture", "trace", "rop", "gpu", "design", "metrics", "picture"]),
     ("report", &["study", "metrics", "picture"]),
     (
         "cli",

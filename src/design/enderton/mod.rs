@@ -103,7 +103,7 @@ impl Blueprint for Enderton {
 
     fn port<const N: usize>(values: &Values, frame: &Frame) -> Result<Option<Port>> {
         let plain = Self::at::<N>(values, frame)?;
-        Ok(Some(stochastic::port("enderton", &Self::INFO, values, frame, plain)))
+        Ok(Some(stochastic::port(("enderton", false), &Self::INFO, values, frame, plain)))
     }
 
     fn promises(values: &Values) -> Promises {

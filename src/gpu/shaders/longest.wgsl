@@ -6,7 +6,7 @@ struct Params {
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read_write> ends: array<vec2<u32>>;
-@group(0) @binding(2) var<storage, read_write> longest: atomic<u32>;
+@group(0) @binding(2) var<storage, read_write> longest: array<atomic<u32>>;
 
 @compute @workgroup_size(256)
 fn find(
@@ -18,8 +18,8 @@ fn find(
     if pixel < params.pixels {
         let length = ends[pixel].y - ends[pixel].x;
         // Most are shorter than the longest so far.
-        if length > atomicLoad(&longest) {
-            atomicMax(&longest, length);
+        if length > atomicLoad(&longest[0]) {
+            atomicMax(&longest[0], length);
         }
     }
 }

@@ -9,9 +9,14 @@
 
 const GROUP: u32 = 64u;
 
-// Names the pixel of a thread; whether there is one.
-fn take_pixel(group: vec3<u32>, groups: vec3<u32>, thread: u32) -> bool {
-    pixel = (group.y * groups.x + group.x) * GROUP + thread;
+// The pixel of a thread, where each has one of its own.
+fn own_pixel(group: vec3<u32>, groups: vec3<u32>, thread: u32) -> u32 {
+    return (group.y * groups.x + group.x) * GROUP + thread;
+}
+
+// Takes a pixel's turn; whether there is such a pixel.
+fn take_pixel(place: u32) -> bool {
+    pixel = place;
     if pixel >= params.taken {
         return false;
     }
@@ -23,13 +28,21 @@ fn take_pixel(group: vec3<u32>, groups: vec3<u32>, thread: u32) -> bool {
     return true;
 }
 
+// The rows of the pixel that are drawn now: from the one to before the other.
+fn rows_of_pixel() -> vec2<u32> {
+    let range = ends[params.first_pixel + pixel];
+    let skipped = min(params.from_fragment, range.y - range.x);
+    let first = range.x + skipped;
+    return vec2<u32>(first, first + min(range.y - first, params.fragments));
+}
+
 @compute @workgroup_size(GROUP)
 fn clear(
     @builtin(workgroup_id) group: vec3<u32>,
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) thread: u32,
 ) {
-    if take_pixel(group, groups, thread) {
+    if take_pixel(own_pixel(group, groups, thread)) {
         clear_pixel();
     }
 }
@@ -40,17 +53,15 @@ fn draw(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) thread: u32,
 ) {
-    if !take_pixel(group, groups, thread) {
+    if !take_pixel(own_pixel(group, groups, thread)) {
         return;
     }
-    let range = ends[params.first_pixel + pixel];
-    if range.y - range.x <= params.from_fragment {
+    let range = rows_of_pixel();
+    if range.x == range.y {
         return;
     }
-    let first = range.x + params.from_fragment;
-    let end = first + min(range.y - first, params.fragments);
     load_pixel();
-    for (var i = first; i < end; i++) {
+    for (var i = range.x; i < range.y; i++) {
         let row = rows[i];
         draw_fragment(fragment(row), row);
     }
@@ -63,7 +74,7 @@ fn end_pass(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) thread: u32,
 ) {
-    if take_pixel(group, groups, thread) {
+    if take_pixel(own_pixel(group, groups, thread)) {
         end_pixel_pass();
     }
 }

@@ -9,7 +9,7 @@ fn resolve(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) thread: u32,
 ) {
-    if take_pixel(group, groups, thread) {
+    if take_pixel(own_pixel(group, groups, thread)) {
         let colour = resolve_pixel();
         picture[3u * pixel] = colour.x;
         picture[3u * pixel + 1u] = colour.y;

@@ -1,0 +1,165 @@
+//! `screendoor throughput`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde::Serialize;
+
+use crate::cli::arguments::{design_list, engine_name, option, samples};
+use crate::cli::console::{Console, grouped, shown, table};
+use crate::cli::files::{Json, check, open_trace, report};
+use crate::error::Result;
+use crate::gpu::{Adapter, Threads};
+use crate::study::engine::EngineName;
+use crate::study::throughput::{Plan, Spread, Throughput, measure};
+
+/// Measure how fast engines replay a trace: fragments, samples and bytes a second
+#[derive(Debug, Args)]
+pub(super) struct Arguments {
+    /// The trace
+    trace: PathBuf,
+    /// The designs, separated by commas, with settings as in 'lk,lk:sort=false,compact=false'
+    #[arg(long, default_value = "lk,systematic", value_name = "LIST")]
+    designs: String,
+    /// Samples per pixel, separated by commas
+    #[arg(long, default_value = "8", value_name = "LIST", value_delimiter = ',', value_parser = samples)]
+    samples: Vec<u32>,
+    /// The engines, separated by commas
+    #[arg(long, default_value = "fast,gpu", value_name = "LIST", value_delimiter = ',', value_parser = engine_name())]
+    engines: Vec<EngineName>,
+    /// The GPU to use: a part of its name or of its driver's
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+    /// What a GPU's thread is given
+    #[arg(long, default_value = "auto", value_name = "WHAT", value_parser = option::<Threads>())]
+    gpu_threads: Threads,
+    /// How often each is measured, after one replay that warms up
+    #[arg(long, default_value_t = 5, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    runs: u16,
+    /// Write the results as JSON to a file, or to standard output for -
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+#[derive(Serialize)]
+struct Document<'a> {
+    trace: &'a str,
+    content: Option<&'a str>,
+    rows: u64,
+    processor: String,
+    threads: usize,
+    adapter: Option<&'a Adapter>,
+    results: Vec<Throughput>,
+}
+
+pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
+    check(&[&arguments.trace], &Json::path(&arguments.json).into_iter().collect::<Vec<_>>())?;
+    let designs = design_list(&arguments.designs)?;
+    let trace = open_trace(&arguments.trace, console)?;
+    for count in &arguments.samples {
+        trace.header().pattern.prefix(*count)?;
+    }
+    let open = |name: &EngineName| {
+        let adapter = arguments.adapter.as_deref().filter(|_| *name == EngineName::Gpu);
+        Ok((*name, name.open(adapter)?.with_threads(arguments.gpu_threads)))
+    };
+    let engines = arguments.engines.iter().map(open).collect::<Result<Vec<_>>>()?;
+    let json = Json::open(&arguments.json)?;
+    let plan =
+        Plan { designs, samples: arguments.samples.clone(), runs: usize::from(arguments.runs) };
+    let progress = console.progress("measuring", "replays");
+    let results = measure(&trace, &engines, &plan, &|name, done, total| {
+        progress.name(name);
+        progress.set(done, total);
+    })?;
+    drop(progress);
+    let document = Document {
+        trace: trace.place(),
+        content: trace.content(),
+        rows: trace.rows(),
+        processor: processor(),
+        threads: rayon::current_num_threads(),
+        adapter: engines.iter().find_map(|(_, engine)| engine.adapter()),
+        results,
+    };
+    report(json, &document, console, || print(&document, console))
+}
+
+/// Millions of things a second.
+fn rate(things: u64, spread: Option<Spread>) -> String {
+    spread.map_or_else(String::new, |s| format!("{:.1}", things as f64 / s.median / 1e6))
+}
+
+fn milliseconds(spread: Option<Spread>) -> String {
+    let ms = |seconds: f64| format!("{:.1}", seconds * 1e3);
+    spread
+        .map_or_else(String::new, |s| format!("{} ({} to {})", ms(s.median), ms(s.low), ms(s.high)))
+}
+
+/// A result as a row of the table.
+fn row(result: &Throughput) -> Vec<String> {
+    let Throughput { fragments, covered, bytes, passes, .. } = result;
+    let (drawn, covered) = (fragments * u64::from(*passes), covered * u64::from(*passes));
+    let gigabytes = |spread: Option<Spread>| {
+        spread.map_or_else(String::new, |s| format!("{:.2}", *bytes as f64 / s.median / 1e9))
+    };
+    let mut row =
+        vec![result.design.clone(), result.samples.to_string(), result.engine.name().to_string()];
+    match &result.missing {
+        Some(why) => row.push(why.clone()),
+        None => row.extend([
+            milliseconds(result.whole),
+            rate(drawn, result.whole),
+            rate(covered, result.whole),
+            gigabytes(result.whole),
+            milliseconds(result.kernel),
+            rate(drawn, result.kernel),
+            gigabytes(result.kernel),
+            milliseconds(result.bin),
+            milliseconds(result.upload),
+            milliseconds(result.back),
+        ]),
+    }
+    row
+}
+
+fn print(document: &Document<'_>, console: &Console) -> Result<()> {
+    let place = shown(document.trace);
+    console.print(format_args!("{place}: {} fragments", grouped(document.rows)))?;
+    console.print(format_args!(
+        "processor: {}, {} threads",
+        shown(&document.processor),
+        document.threads
+    ))?;
+    if let Some(adapter) = document.adapter {
+        console.print(format_args!("GPU: {}", shown(adapter.to_string())))?;
+    }
+    let header = [
+        "design",
+        "samples",
+        "engine",
+        "whole, ms",
+        "M frag/s",
+        "M samples/s",
+        "GB/s",
+        "kernel, ms",
+        "M frag/s",
+        "GB/s",
+        "sorting, ms",
+        "upload, ms",
+        "back, ms",
+    ];
+    let table = table(&header, document.results.iter().map(row).collect());
+    console.print(format_args!("{table}"))?;
+    console.print(format_args!(
+        "medians (quartiles) of several replays; kernel and sorting by the GPU's own clock; \
+         bytes are those that must move: columns and state, once a pass"
+    ))
+}
+
+/// The processor's name, where the system tells it.
+fn processor() -> String {
+    let told = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let name = told.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
+    name.map_or_else(|| std::env::consts::ARCH.to_string(), |(_, name)| name.trim().to_string())
+}
