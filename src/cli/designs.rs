@@ -25,12 +25,15 @@ struct Document {
     info: Info,
     /// With default parameters.
     promises: Promises,
+    /// Whether `replay --engine gpu` can run it.
+    gpu: bool,
 }
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let json = Json::open(&arguments.json)?;
     let document = |entry: &Entry| -> Result<Document> {
-        Ok(Document { info: entry.info, promises: entry.configure(&[])?.promises() })
+        let promises = entry.configure(&[])?.promises();
+        Ok(Document { info: entry.info, promises, gpu: entry.is_ported() })
     };
     let documents = DESIGNS.iter().map(document).collect::<Result<Vec<_>>>()?;
     report(json, &documents, console, || print(&documents, console))
@@ -39,10 +42,14 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
 fn print(documents: &[Document], console: &Console) -> Result<()> {
     for (family, about) in Family::ALL.iter().zip(Family::CHOICES) {
         console.print(format_args!("{}: {}\n", about.name, about.help))?;
-        for Document { info, promises } in documents.iter().filter(|d| d.info.family == *family) {
+        for Document { info, promises, gpu } in
+            documents.iter().filter(|d| d.info.family == *family)
+        {
             console
                 .print(format_args!("{}\n  {}\n  {}", info.name, info.summary, info.citation))?;
-            console.print(format_args!("  {}", promises.words().join(", ")))?;
+            let port = gpu.then_some("runs on GPUs too");
+            let words: Vec<&str> = promises.words().into_iter().chain(port).collect();
+            console.print(format_args!("  {}", words.join(", ")))?;
             print_params(info.params, console)?;
         }
         console.print(format_args!(""))?;

@@ -31,7 +31,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
     /// What a GPU's thread is given
-    #[arg(long, default_value = "auto", value_name = "WHAT", value_parser = option::<Threads>())]
+    #[arg(long, default_value = "pixel", value_name = "WHAT", value_parser = option::<Threads>())]
     gpu_threads: Threads,
     /// How often each is measured, after one replay that warms up
     #[arg(long, default_value_t = 5, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1000))]

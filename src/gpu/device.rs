@@ -5,7 +5,6 @@ use std::fmt;
 use std::sync::{Arc, Mutex};
 
 use serde::Serialize;
-use wgpu::util::DeviceExt;
 
 use crate::error::{Error, Result};
 
@@ -230,12 +229,11 @@ impl Gpu {
         bytes: &[u8],
         usage: wgpu::BufferUsages,
     ) -> Result<wgpu::Buffer> {
-        self.holds(label, bytes.len() as u64)?;
         let contents = if bytes.is_empty() { &[0; 4] } else { bytes };
-        let descriptor = wgpu::util::BufferInitDescriptor { label: Some(label), contents, usage };
-        let buffer = self.device.create_buffer_init(&descriptor);
-        self.check(&format!("uploading {label}"))?;
-        Ok(buffer)
+        self.mapped(label, contents.len() as u64, usage, |mut to| {
+            to.slice(..contents.len()).copy_from_slice(contents);
+            Ok(())
+        })
     }
 
     /// A buffer of so many bytes that `fill` fills.

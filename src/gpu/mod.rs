@@ -11,6 +11,8 @@ mod device;
 mod params;
 mod replay;
 mod shader;
+#[cfg(test)]
+mod tests;
 mod time;
 
 /// The most by which a channel of a blending design's picture may differ from the plain

@@ -15,14 +15,13 @@ use crate::gpu::params::Params;
 use crate::gpu::shader;
 use crate::gpu::time::Timer;
 use crate::picture::{Picture, TilePixels};
-use crate::rop::{Frame, Port, TileState, TileWords};
+use crate::rop::{Constant, Frame, Port, TileState, TileWords};
 use crate::tile::{TILE_PIXELS, TileId, TileMap};
 use crate::trace::Trace;
 
 crate::options! {
-    /// What a thread is given.
+    /// What a thread is given. Pixels measure faster at every sample count (docs/PERFORMANCE.md).
     pub enum Threads {
-        Auto = "auto": "what measures faster at the sample count",
         Pixel = "pixel": "a pixel",
         Sample = "sample": "a sample, where the design is for it; those of a pixel work together",
     }
@@ -43,7 +42,7 @@ pub struct GpuOptions<'a> {
 
 impl Default for GpuOptions<'_> {
     fn default() -> Self {
-        let threads = Threads::Auto;
+        let threads = Threads::Pixel;
         GpuOptions { threads, rows: u64::MAX, resident: 1 << 31, progress: &|_, _| () }
     }
 }
@@ -122,7 +121,7 @@ impl Programs {
         threads: Threads,
     ) -> Result<Self> {
         let samples = frame.samples();
-        let source = source(&[port.program], port, samples, chunks);
+        let source = source(&[port.program], port, samples, chunks.types());
         use Access::{Read, Uniform, Write};
         let bindings = [Uniform, Read, Read, Write, Read, Read, Read, Write];
         let bindings = bindings.iter().enumerate();
@@ -130,14 +129,10 @@ impl Programs {
             bindings.map(|(i, access)| Binding { number: i as u32, access: *access }).collect();
         let layout = gpu.layout(&bindings);
         let program = |entry| gpu.pipeline(&source, entry, &layout);
-        let lanes = match threads {
-            Threads::Auto => by_sample(samples),
-            Threads::Pixel => false,
-            Threads::Sample => true,
-        };
-        let (draw, drawn, iterations) = if lanes && port.by_sample {
+        let by_sample = threads == Threads::Sample && port.by_sample;
+        let (draw, drawn, iterations) = if by_sample {
             let file = lanes_file(gpu, samples);
-            let source = self::source(&[port.program, file], port, samples, chunks);
+            let source = self::source(&[port.program, file], port, samples, chunks.types());
             // Two loops over the samples, and what a reference value may take.
             let iterations = 2 * samples + u32::BITS;
             (gpu.pipeline(&source, "draw_lanes", &layout)?, GROUP / samples as usize, iterations)
@@ -161,11 +156,6 @@ impl Programs {
     }
 }
 
-/// Whether threads are better given samples than pixels, as measured (docs/PERFORMANCE.md).
-fn by_sample(samples: u32) -> bool {
-    samples >= 32
-}
-
 /// How the threads of a pixel look at each other's values.
 fn lanes_file(gpu: &Gpu, samples: u32) -> &'static str {
     let [least, most] = gpu.adapter().subgroup;
@@ -178,9 +168,14 @@ fn lanes_file(gpu: &Gpu, samples: u32) -> &'static str {
 }
 
 /// The text of a design's program for a trace's columns.
-fn source(files: &[&str], port: &Port, samples: u32, chunks: &Chunks) -> String {
+pub(super) fn source(
+    files: &[&str],
+    port: &Port,
+    samples: u32,
+    types: impl Iterator<Item = (String, Constant)>,
+) -> String {
     let mut constants = port.constants.clone();
-    constants.extend(chunks.types());
+    constants.extend(types);
     constants.extend(port.places());
     shader::program(files, samples, &constants)
 }

@@ -9,7 +9,7 @@ use crate::rop::Constant;
 macro_rules! files {
     ($($name:literal),+ $(,)?) => {
         /// Names and texts.
-        const FILES: &[(&str, &str)] =
+        pub(super) const FILES: &[(&str, &str)] =
             &[$(($name, include_str!(concat!("shaders/", $name, ".wgsl")))),+];
     };
 }
@@ -67,7 +67,37 @@ pub fn program(files: &[&str], samples: u32, constants: &[(String, Constant)]) -
     }
     let mut done = Vec::new();
     files.iter().for_each(|file| append(file, samples, &mut done, &mut text));
+    #[cfg(test)]
+    let text = defect::plant(text);
     text
+}
+
+/// Defects that tests plant into shaders.
+#[cfg(test)]
+pub(super) mod defect {
+    use std::cell::Cell;
+
+    /// A text of a shader, and what stands in its place.
+    pub type Defect = (&'static str, &'static str);
+
+    thread_local! {
+        static PLANTED: Cell<Option<Defect>> = const { Cell::new(None) };
+    }
+
+    /// Runs `then` with a defect in the shaders that are put together meanwhile.
+    pub fn with<T>(defect: Option<Defect>, then: impl FnOnce() -> T) -> T {
+        PLANTED.set(defect);
+        let result = then();
+        PLANTED.set(None);
+        result
+    }
+
+    pub fn plant(text: String) -> String {
+        match PLANTED.get() {
+            Some((good, bad)) => text.replacen(good, bad, 1),
+            None => text,
+        }
+    }
 }
 
 fn append(name: &str, samples: u32, done: &mut Vec<String>, text: &mut String) {

@@ -48,7 +48,7 @@ impl EngineName {
                 "add --engine gpu, or leave --adapter out",
             )),
             (EngineName::Gpu, adapter) => {
-                Ok(Engine::Gpu(Box::new(Gpu::open(adapter)?), Threads::Auto))
+                Ok(Engine::Gpu(Box::new(Gpu::open(adapter)?), Threads::Pixel))
             }
         }
     }

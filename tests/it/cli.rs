@@ -1,5 +1,6 @@
 //! The program as its users run it.
 
+mod gpu;
 mod outputs;
 mod words;
 

@@ -1,6 +1,12 @@
 //! What several tests share.
 
+use std::io::Write;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use screendoor::design::{Configured, DESIGNS, Entry};
+use screendoor::error::Error;
+use screendoor::gpu::Gpu;
 use screendoor::param::{Kind, parse_spec};
 use screendoor::picture::Picture;
 use screendoor::random::Stream;
@@ -136,4 +142,23 @@ pub fn layered(
         }
     }
     fragments
+}
+
+/// The GPU, opened once. Where there is none, the tests that ask for it are skipped, and
+/// counted so; with `SCREENDOOR_GPU=require` they fail.
+pub fn gpu() -> Option<&'static Gpu> {
+    static GPU: OnceLock<Result<Gpu, Error>> = OnceLock::new();
+    static SKIPPED: AtomicUsize = AtomicUsize::new(0);
+    match GPU.get_or_init(|| Gpu::open(None)) {
+        Ok(gpu) => Some(gpu),
+        Err(error) => {
+            let required = std::env::var_os("SCREENDOOR_GPU").is_some_and(|v| v == "require");
+            assert!(!required, "SCREENDOOR_GPU=require, but: {error}");
+            let skipped = SKIPPED.fetch_add(1, Ordering::Relaxed) + 1;
+            // Not by the macro, of which a passed test's words are not shown.
+            let said = format!("skipped GPU tests: {skipped} ({error})\n");
+            std::io::stderr().write_all(said.as_bytes()).unwrap();
+            None
+        }
+    }
 }
