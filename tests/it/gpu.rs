@@ -1,8 +1,6 @@
 //! The GPU port gives the bits of the plain text. Without an adapter these tests are
 //! counted as skipped, or fail where `SCREENDOOR_GPU=require` says that there is one.
 
-use std::sync::OnceLock;
-
 use screendoor::design::{Configured, DESIGNS};
 use screendoor::gpu::{Gpu, GpuOptions, GpuRun};
 use screendoor::rop::{Contents, Frame, ReplayOptions, Told, Which};
@@ -10,26 +8,7 @@ use screendoor::tile::{TileGrid, TileId};
 use screendoor::trace::{Block, Fragment, Header, Trace, WriteOptions};
 
 use crate::fast::crowd;
-use crate::util::{header, random_fragments, trace, trace_bytes, variants};
-
-/// The GPU, opened once; `None` where there is none and none is required.
-fn gpu() -> Option<&'static Gpu> {
-    static GPU: OnceLock<Option<Gpu>> = OnceLock::new();
-    let gpu = GPU.get_or_init(|| match Gpu::open(None) {
-        Ok(gpu) => {
-            eprintln!("GPU: {}", gpu.adapter());
-            Some(gpu)
-        }
-        Err(error) if std::env::var_os("SCREENDOOR_GPU").is_some_and(|v| v == "require") => {
-            panic!("SCREENDOOR_GPU=require, but: {error}")
-        }
-        Err(error) => {
-            eprintln!("skipped: {error}");
-            None
-        }
-    });
-    gpu.as_ref()
-}
+use crate::util::{gpu, header, random_fragments, trace, trace_bytes, variants};
 
 /// What the touched tiles' pixels hold, and the picture's hash.
 type Found = (Vec<(TileId, Vec<Contents>)>, String);

@@ -1,6 +1,9 @@
 //! What several tests share.
 
+use std::sync::OnceLock;
+
 use screendoor::design::{Configured, DESIGNS, Entry};
+use screendoor::gpu::Gpu;
 use screendoor::param::{Kind, parse_spec};
 use screendoor::picture::Picture;
 use screendoor::random::Stream;
@@ -136,4 +139,23 @@ pub fn layered(
         }
     }
     fragments
+}
+
+/// The GPU, opened once; `None` where there is none and none is required.
+pub fn gpu() -> Option<&'static Gpu> {
+    static GPU: OnceLock<Option<Gpu>> = OnceLock::new();
+    let gpu = GPU.get_or_init(|| match Gpu::open(None) {
+        Ok(gpu) => {
+            eprintln!("GPU: {}", gpu.adapter());
+            Some(gpu)
+        }
+        Err(error) if std::env::var_os("SCREENDOOR_GPU").is_some_and(|v| v == "require") => {
+            panic!("SCREENDOOR_GPU=require, but: {error}")
+        }
+        Err(error) => {
+            eprintln!("skipped: {error}");
+            None
+        }
+    });
+    gpu.as_ref()
 }
