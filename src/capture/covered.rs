@@ -1,6 +1,6 @@
 //! Fragments whose coverage another rasteriser has found: depth and colour are ours.
 
-use glam::DVec4;
+use glam::{DVec3, DVec4};
 
 use crate::capture::geometry::Geometry;
 use crate::capture::raster::{Raster, Weights};
@@ -80,6 +80,12 @@ impl SetUp<'_> {
     /// Whether nothing is left of it on our grid.
     pub fn is_empty(&self) -> bool {
         self.drawn.pieces.is_empty()
+    }
+
+    /// Whether clipping has cut it.
+    pub fn is_clipped(&self) -> bool {
+        let corner = |w: &DVec3| w.max_element() == 1.0;
+        !self.drawn.pieces.iter().all(|piece| piece.weights.iter().all(corner))
     }
 
     /// The fragment of pixel `[x, y]` where the triangle covers `coverage` there. `depth` is

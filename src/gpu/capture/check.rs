@@ -18,6 +18,10 @@ pub struct Difference {
     pub on_an_edge: u64,
     /// It lies within √2 steps of an edge: a corner was snapped to another step.
     pub beside_an_edge: u64,
+    /// It lies within 32 steps of an edge of a triangle that clipping has cut: its new
+    /// corners are computed, and single precision moves them further where they lie close
+    /// to the camera.
+    pub clipped: u64,
     /// The triangle has no area on our grid, or shows its back there.
     pub no_area: u64,
     /// None of these: a difference that nothing explains.
@@ -27,7 +31,7 @@ pub struct Difference {
 impl Difference {
     /// All of them.
     pub fn all(&self) -> u64 {
-        self.on_an_edge + self.beside_an_edge + self.no_area + self.unexplained
+        self.on_an_edge + self.beside_an_edge + self.clipped + self.no_area + self.unexplained
     }
 }
 
@@ -46,18 +50,21 @@ pub struct CrossCheck {
     pub samples: u64,
     /// Samples that are covered for one and not for the other.
     pub differing: Difference,
+    /// How far the furthest of them lies from an edge, in steps of 1/256 pixel.
+    pub furthest: f64,
     /// The largest difference of depth at the centre of a pixel that both cover wholly, as a
     /// share of the depth range.
     pub depth: f64,
 }
 
-/// How far an edge moves where its corners move by a step along both axes; and a little
-/// for corners that clipping makes.
-const REACH: f64 = 1.5;
+/// How far an edge moves where its corners move by a step along both axes: √2.
+const REACH: f64 = std::f64::consts::SQRT_2;
+/// The same where clipping has made corners.
+const CLIPPED_REACH: f64 = 32.0;
 
 impl CrossCheck {
     /// It in words and numbers, for a table.
-    pub fn rows(&self) -> [(&'static str, String); 11] {
+    pub fn rows(&self) -> [(&'static str, String); 13] {
         let differing = &self.differing;
         let counts = [
             ("triangles", self.triangles),
@@ -68,11 +75,15 @@ impl CrossCheck {
             ("samples that differ", differing.all()),
             ("  on an edge", differing.on_an_edge),
             ("  beside an edge", differing.beside_an_edge),
+            ("  of clipped triangles", differing.clipped),
             ("  of triangles without area on our grid", differing.no_area),
             ("  unexplained", differing.unexplained),
         ];
         std::array::from_fn(|i| match counts.get(i) {
             Some((what, count)) => (*what, count.to_string()),
+            None if i == counts.len() => {
+                ("furthest from an edge, in 1/256 pixel", format!("{:.2}", self.furthest))
+            }
             None => ("largest difference of depth, of its range", format!("{:.1e}", self.depth)),
         })
     }
@@ -102,11 +113,15 @@ impl CrossCheck {
             let [x, y] = [pixel as u16, (pixel >> 16) as u16];
             for sample in SampleMask(our_mask.0 ^ their_mask.0).iter() {
                 let distance = ours.distance([x, y], sample);
+                if !ours.is_empty() {
+                    check.furthest = check.furthest.max(distance);
+                }
                 let differing = &mut check.differing;
                 *match distance {
                     _ if ours.is_empty() => &mut differing.no_area,
                     0.0 => &mut differing.on_an_edge,
                     d if d <= REACH => &mut differing.beside_an_edge,
+                    d if d <= CLIPPED_REACH && ours.is_clipped() => &mut differing.clipped,
                     _ => &mut differing.unexplained,
                 } += 1;
             }
@@ -132,9 +147,11 @@ impl CrossCheck {
             differing: Difference {
                 on_an_edge: a.on_an_edge + b.on_an_edge,
                 beside_an_edge: a.beside_an_edge + b.beside_an_edge,
+                clipped: a.clipped + b.clipped,
                 no_area: a.no_area + b.no_area,
                 unexplained: a.unexplained + b.unexplained,
             },
+            furthest: self.furthest.max(other.furthest),
             depth: self.depth.max(other.depth),
         }
     }

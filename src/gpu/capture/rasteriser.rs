@@ -51,8 +51,9 @@ impl<'a> Rasteriser<'a> {
                 format_args!("each side is {longest} at most: choose a smaller --size"),
             ));
         }
-        // One row of one triangle is the least that can be drawn at a time.
-        let capacity = capacity.max(size[0]).min(FragmentBuffer::most(&gpu.device));
+        // One row of one triangle is the least that can be drawn at a time. Clipping by six
+        // planes leaves up to seven pieces of it.
+        let capacity = capacity.max(7 * size[0]).min(FragmentBuffer::most(&gpu.device));
         let fragments = FragmentBuffer::new(&gpu.device, capacity)?;
         let format = wgpu::TextureFormat::R8Unorm;
         let target = gpu.device.create_texture(&wgpu::TextureDescriptor {
@@ -97,6 +98,12 @@ impl<'a> Rasteriser<'a> {
                 Captured::All(fragments) => each(fragments)?,
                 Captured::TooMany(needed) => {
                     let room = u64::from(self.fragments.capacity());
+                    if part.triangles.len() == 1 && part.rows.len() == 1 {
+                        return Err(self.gpu.error(
+                            format_args!("one row of a triangle leaves {needed} fragments in it"),
+                            "choose a smaller --size, or capture without --gpu",
+                        ));
+                    }
                     // A little more than would do if all were of one size.
                     let parts = needed * 5 / 4 / room + 1;
                     left.extend(part.cut(parts.max(2) as u32).rev());
