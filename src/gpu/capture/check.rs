@@ -18,7 +18,7 @@ pub struct Difference {
     pub on_an_edge: u64,
     /// It lies within √2 steps of an edge: a corner was snapped to another step.
     pub beside_an_edge: u64,
-    /// It lies within 32 steps of an edge of a triangle that clipping has cut: its new
+    /// It lies within 8 steps of an edge of a triangle that clipping has cut: its new
     /// corners are computed, and single precision moves them further where they lie close
     /// to the camera.
     pub clipped: u64,
@@ -60,7 +60,7 @@ pub struct CrossCheck {
 /// How far an edge moves where its corners move by a step along both axes: √2.
 const REACH: f64 = std::f64::consts::SQRT_2;
 /// The same where clipping has made corners.
-const CLIPPED_REACH: f64 = 32.0;
+const CLIPPED_REACH: f64 = 8.0;
 
 impl CrossCheck {
     /// It in words and numbers, for a table.
