@@ -34,7 +34,7 @@ pub fn sample_positions(gpu: &Gpu) -> Result<SamplePattern> {
         for fragment in fragments {
             let place = fragment.primitive / 2;
             let [i, j] = [place % PLACES, place / PLACES];
-            if fragment.pixel != (2 * i | (2 * j) << 16) {
+            if fragment.pixel != ((2 * i) | ((2 * j) << 16)) {
                 // A square at the pixel's border reaches over it.
                 continue;
             }
