@@ -59,3 +59,8 @@ pub mod trace;
 #[cfg(doctest)]
 #[doc = include_str!("../docs/ADD_A_DESIGN.md")]
 pub struct AddADesign;
+
+/// The example of `docs/GPU_CAPTURE.md`, compiled and run as a test.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/GPU_CAPTURE.md")]
+pub struct GpuCapture;

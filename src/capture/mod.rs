@@ -7,6 +7,7 @@
 //! million pixels' worth of work in flight.
 
 mod camera;
+mod covered;
 mod geometry;
 mod order;
 mod pattern;
@@ -19,6 +20,7 @@ use std::io::Write;
 use rayon::prelude::*;
 
 pub use camera::{Camera, CameraOptions};
+pub(crate) use covered::{Drawing, SetUp};
 pub use order::Order;
 pub use pattern::{PatternKind, pattern};
 
@@ -210,12 +212,17 @@ impl<'a> Capture<'a> {
         Trace::from_bytes(writer.finish()?.0, source)
     }
 
-    fn prepare(&self, triangle: Triangle, shader: &Shader<'_>) -> Drawn {
-        let keep_back = match self.options.faces {
+    /// Whether a triangle is drawn where it shows its back.
+    fn keeps_back(&self, triangle: &Triangle, shader: &Shader<'_>) -> bool {
+        match self.options.faces {
             Faces::Both => true,
             Faces::Front => false,
             Faces::Material => shader.material(triangle.material).double_sided,
-        };
+        }
+    }
+
+    fn prepare(&self, triangle: Triangle, shader: &Shader<'_>) -> Drawn {
+        let keep_back = self.keeps_back(&triangle, shader);
         let mut pieces = Vec::new();
         set_up(&triangle, &self.camera, keep_back, &mut pieces);
         Drawn { triangle, pieces }

@@ -128,19 +128,45 @@ impl<'a> Raster<'a> {
             if coverage.is_empty() {
                 continue;
             }
-            let shade_at = if values.iter().all(|v| *v >= 0) {
-                centre
-            } else {
-                self.nearest_sample(centre, coverage)
-            };
-            found(Hit {
-                x: x as u16,
-                y: y as u16,
-                coverage,
-                depth: self.depth_plane(centre, shade_at),
-                shade_at,
-            });
+            found(self.hit([x, y], values, coverage));
         }
+    }
+
+    /// What it leaves in pixel `[x, y]` where it covers `coverage` there, whatever its own
+    /// edges say.
+    pub fn covered(&self, [x, y]: [i64; 2], coverage: SampleMask) -> Hit {
+        let centre = [x, y].map(|v| v * STEPS + STEPS / 2);
+        self.hit([x, y], self.edges.map(|e| e.at(centre)), coverage)
+    }
+
+    /// `values` are the edges' at the pixel's centre.
+    fn hit(&self, pixel: [i64; 2], values: [i64; 3], coverage: SampleMask) -> Hit {
+        let centre = pixel.map(|v| v * STEPS + STEPS / 2);
+        let shade_at = if values.iter().all(|v| *v >= 0) {
+            centre
+        } else {
+            self.nearest_sample(centre, coverage)
+        };
+        let [x, y] = pixel.map(|v| v as u16);
+        Hit { x, y, coverage, depth: self.depth_plane(centre, shade_at), shade_at }
+    }
+
+    /// How far a point lies outside, in sub-pixel steps; 0 inside.
+    pub fn outside(&self, point: [i64; 2]) -> f64 {
+        if self.edges.iter().all(|e| e.at(point) >= 0) { 0.0 } else { self.distance(point) }
+    }
+
+    /// How far a point lies from the nearest of its edges, in sub-pixel steps.
+    pub fn distance(&self, point: [i64; 2]) -> f64 {
+        let corners = self.triangle.corners;
+        let edge = |i: usize| {
+            let [from, to] = [corners[i], corners[(i + 1) % 3]].map(|p| p.map(|v| v as f64));
+            let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
+            let (px, py) = (point[0] as f64 - from[0], point[1] as f64 - from[1]);
+            let along = ((px * dx + py * dy) / (dx * dx + dy * dy)).clamp(0.0, 1.0);
+            libm::hypot(px - along * dx, py - along * dy)
+        };
+        edge(0).min(edge(1)).min(edge(2))
     }
 
     fn coverage(&self, values: [i64; 3]) -> SampleMask {

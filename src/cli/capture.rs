@@ -7,9 +7,11 @@ use clap::Args;
 
 use crate::capture::{CameraOptions, Capture, CaptureOptions, Faces, Order, PatternKind};
 use crate::cli::arguments::{self, colour, numbers, option, samples, size};
-use crate::cli::console::{Console, grouped, shown};
+use crate::cli::console::{Console, grouped, shown, table};
 use crate::cli::files::{check, check_scene};
 use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::gpu::capture::GpuCapture;
 use crate::output::OutputFile;
 use crate::scene::{self, Scene};
 use crate::trace::{
@@ -29,9 +31,10 @@ pub(super) struct Arguments {
     /// Frame size in pixels
     #[arg(long, default_value = "800x800", value_name = "WxH", value_parser = size)]
     size: (u32, u32),
-    /// Samples per pixel; a trace of 64 serves every smaller count too
-    #[arg(long, default_value = "64", value_name = "N", value_parser = samples, allow_negative_numbers = true)]
-    samples: u32,
+    /// Samples per pixel: 64 where not given, 4 with --gpu; a trace of 64 serves every
+    /// smaller count too
+    #[arg(long, value_name = "N", value_parser = samples, allow_negative_numbers = true)]
+    samples: Option<u32>,
     /// Where the samples lie
     #[arg(long, default_value = "auto", value_parser = option::<PatternKind>())]
     pattern: PatternKind,
@@ -71,6 +74,15 @@ pub(super) struct Arguments {
     /// How the trace's columns are stored
     #[arg(long, default_value = "none", value_parser = option::<Compression>())]
     compress: Compression,
+    /// Have a GPU find which samples are covered, at its own 4 samples a pixel
+    #[arg(long)]
+    gpu: bool,
+    /// Which GPU: a part of its name or its driver's
+    #[arg(long, value_name = "NAME", requires = "gpu")]
+    adapter: Option<String>,
+    /// Draw with our own rasteriser too, and print where the two differ
+    #[arg(long, requires = "gpu")]
+    check: bool,
 }
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
@@ -81,6 +93,8 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
             "name a file (./- for one that is called so)",
         ));
     }
+    // A machine without a GPU is told before anything is done.
+    let gpu = arguments.gpu.then(|| Gpu::open(arguments.adapter.as_deref())).transpose()?;
     let inputs: Vec<&Path> = path.into_iter().chain(arguments.texture.as_deref()).collect();
     check(&inputs, &[&arguments.output])?;
     let file = OutputFile::create(&arguments.output)?;
@@ -96,7 +110,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let options = CaptureOptions {
         width,
         height,
-        samples: arguments.samples,
+        samples: arguments.samples.unwrap_or(if arguments.gpu { 4 } else { 64 }),
         pattern: arguments.pattern,
         alpha: arguments.alpha,
         order: arguments.order,
@@ -111,7 +125,17 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         },
     };
     let write = WriteOptions { compression: arguments.compress, ..WriteOptions::default() };
-    let written = record(&scene, &options, write, file, console)?;
+    let written = match &gpu {
+        None => record(&scene, &options, write, file, console)?,
+        Some(gpu) => {
+            let capture = GpuCapture::new(gpu, &scene, &options)?;
+            let recorded = record_by_gpu(&scene, &capture, write, file, console)?;
+            if arguments.check {
+                cross_check(&capture, console)?;
+            }
+            recorded
+        }
+    };
     console.print(format_args!(
         "{}: {} fragments, {:.1} MB, content {}",
         shown(arguments.output.display()),
@@ -129,21 +153,58 @@ pub(super) fn record(
     file: OutputFile,
     console: &Console,
 ) -> Result<Written> {
+    let capture = Capture::new(scene, options)?;
+    let draw = |writer: &mut Writer, told: Told<'_>| capture.draw(writer, told);
+    into_file(scene, capture.header(), draw, write, file, console)
+}
+
+/// The same by a GPU.
+fn record_by_gpu(
+    scene: &Scene,
+    capture: &GpuCapture<'_>,
+    write: WriteOptions,
+    file: OutputFile,
+    console: &Console,
+) -> Result<Written> {
+    let draw = |writer: &mut Writer, told: Told<'_>| capture.draw(writer, told);
+    into_file(scene, capture.header(), draw, write, file, console)
+}
+
+type Writer = TraceWriter<OutputFile>;
+type Told<'a> = &'a mut (dyn FnMut(u64, u64) + Send);
+
+fn into_file(
+    scene: &Scene,
+    header: &Header,
+    draw: impl FnOnce(&mut Writer, Told<'_>) -> Result<()>,
+    write: WriteOptions,
+    file: OutputFile,
+    console: &Console,
+) -> Result<Written> {
     for warning in &scene.warnings {
         console.warn(warning);
     }
-    let capture = Capture::new(scene, options)?;
-    let (header, place) = (capture.header().clone(), file.path().display().to_string());
-    let mut writer = TraceWriter::new(file, &place, header, write)?;
+    let place = file.path().display().to_string();
+    let mut writer = TraceWriter::new(file, &place, header.clone(), write)?;
     let progress = console.progress("capturing", "triangles");
-    capture.draw(&mut writer, |done, total| progress.set(done, total))?;
+    draw(&mut writer, &mut |done, total| progress.set(done, total))?;
     drop(progress);
     let (file, written) = writer.finish()?;
     file.commit()?;
     if written.rows == 0 {
-        console.warn(&format!("the trace has no fragments: {}", why_empty(capture.header())));
+        console.warn(&format!("the trace has no fragments: {}", why_empty(header)));
     }
     Ok(written)
+}
+
+/// Prints where the GPU's rasteriser and ours differ.
+fn cross_check(capture: &GpuCapture<'_>, console: &Console) -> Result<()> {
+    let progress = console.progress("comparing", "triangles");
+    let pattern = &capture.header().pattern;
+    let found = capture.check(pattern, |done, total| progress.set(done, total))?;
+    drop(progress);
+    let rows = found.rows().map(|(what, count)| vec![what.to_string(), count]);
+    console.print(format_args!("{}", table(&["our rasteriser against the GPU's", ""], rows.into())))
 }
 
 /// Why nothing was drawn, as far as it is known.

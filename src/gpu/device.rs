@@ -181,7 +181,7 @@ impl Gpu {
             None => Ok(()),
             Some(Fault::Memory) => Err(self.error(
                 format_args!("its memory is full ({doing})"),
-                "close other programs, choose fewer samples, or replay with --engine fast",
+                "close other programs, choose fewer samples, or do without the GPU",
             )),
             Some(Fault::Lost(why)) => Err(self.error(
                 format_args!("it was lost ({doing}): {why}"),
@@ -192,7 +192,7 @@ impl Gpu {
                     "{doing} failed: {}",
                     why.split_whitespace().collect::<Vec<_>>().join(" ")
                 ),
-                "this is a fault of screendoor or of the driver: replay with --engine fast",
+                "this is a fault of screendoor or of the driver: do without the GPU",
             )),
         }
     }
@@ -275,7 +275,7 @@ impl Gpu {
         }
         Err(self.error(
             format_args!("{label} take {bytes} bytes, and a buffer holds {most} at most"),
-            "replay with --engine fast",
+            "do without the GPU",
         ))
     }
 

@@ -6,6 +6,7 @@
 //! arithmetic on both sides, so that the stochastic family leaves the same bits.
 
 mod bin;
+pub mod capture;
 mod chunk;
 mod device;
 mod params;

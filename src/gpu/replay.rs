@@ -71,6 +71,7 @@ pub struct GpuRun<'a> {
     pages: Vec<Page>,
     /// The touched tiles, in the order of their places.
     tiles: Vec<TileId>,
+    tile_of: wgpu::Buffer,
     /// Fragments drawn, over all passes.
     fragments: u64,
     seconds: GpuSeconds,
@@ -102,6 +103,8 @@ struct Programs {
     end_pass: wgpu::ComputePipeline,
     resolve: Option<wgpu::ComputePipeline>,
     tables: wgpu::Buffer,
+    /// What is bound where a program looks at nothing: to read from, and to write to.
+    nothing: [wgpu::Buffer; 2],
 }
 
 /// Loop iterations of a thread, at most. Mesa's software driver ends all loops of a thread
@@ -139,6 +142,7 @@ impl Programs {
         } else {
             (program("draw")?, GROUP, port.iterations)
         };
+        let storage = wgpu::BufferUsages::STORAGE;
         Ok(Programs {
             clear: program("clear")?,
             draw,
@@ -151,6 +155,7 @@ impl Programs {
                 bytemuck::cast_slice(&tables(port, frame)),
                 wgpu::BufferUsages::STORAGE,
             )?,
+            nothing: [gpu.buffer("nothing", 8, storage)?, gpu.buffer("nothing", 8, storage)?],
             layout,
         })
     }
@@ -214,6 +219,7 @@ impl<'a> GpuRun<'a> {
             timer: Timer::new(gpu)?,
             pages: Vec::new(),
             tiles: Vec::new(),
+            tile_of: gpu.buffer("tiles", 4, wgpu::BufferUsages::STORAGE)?,
             fragments: 0,
             seconds: GpuSeconds::default(),
             start,
@@ -262,7 +268,9 @@ impl<'a> GpuRun<'a> {
                 done += chunks.rows(i) as u64;
                 (options.progress)(done, total);
             }
-            self.for_all_pages("end of pass", |run| &run.programs.end_pass, None)?;
+            if self.port.ends_passes {
+                self.for_all_pages("end of pass", |run| &run.programs.end_pass, None)?;
+            }
         }
         Ok(())
     }
@@ -279,6 +287,12 @@ impl<'a> GpuRun<'a> {
                 self.tiles.push(TileId(tile as u32));
             }
         }
+        if first == self.tiles.len() {
+            return Ok(());
+        }
+        let tiles: Vec<u32> = self.tiles.iter().map(|tile| tile.0).collect();
+        let usage = wgpu::BufferUsages::STORAGE;
+        self.tile_of = self.gpu.filled("tiles", bytemuck::cast_slice(&tiles), usage)?;
         let words = u64::from(self.port.words()) * TILE_PIXELS as u64;
         let limits = self.gpu.limits();
         let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
@@ -357,21 +371,17 @@ impl<'a> GpuRun<'a> {
             ..chunk.map_or(self.params, |(_, params)| params)
         };
         let chunk = chunk.map(|(chunk, _)| chunk);
-        let usage = wgpu::BufferUsages::STORAGE;
         // What is not there is not read.
-        let (nothing, nowhere) =
-            (self.gpu.buffer("nothing", 8, usage)?, self.gpu.buffer("nothing", 8, usage)?);
-        let tile_of: Vec<u32> = self.tiles.iter().map(|tile| tile.0).collect();
-        let tile_of = self.gpu.filled("tiles", bytemuck::cast_slice(&tile_of), usage)?;
+        let [nothing, nowhere] = &self.programs.nothing;
         let buffers = [
             (0, &uniform(self.gpu, &params)?),
-            (1, chunk.map_or(&nothing, |chunk| &chunk.uploaded.columns)),
+            (1, chunk.map_or(nothing, |chunk| &chunk.uploaded.columns)),
             (2, &self.programs.tables),
             (3, state),
-            (4, chunk.map_or(&nothing, |chunk| &chunk.sorted.rows)),
-            (5, chunk.map_or(&nothing, |chunk| &chunk.sorted.ends)),
-            (6, &tile_of),
-            (7, picture.unwrap_or(&nowhere)),
+            (4, chunk.map_or(nothing, |chunk| &chunk.sorted.rows)),
+            (5, chunk.map_or(nothing, |chunk| &chunk.sorted.ends)),
+            (6, &self.tile_of),
+            (7, picture.unwrap_or(nowhere)),
         ];
         let bound = self.gpu.bind(&self.programs.layout, &buffers);
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());

@@ -15,9 +15,11 @@ macro_rules! files {
 }
 
 files![
+    "append",
     "arithmetic",
     "bin",
     "bindings",
+    "capture",
     "dither",
     "enderton",
     "fragment",

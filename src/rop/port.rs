@@ -50,6 +50,7 @@ pub struct Declaration {
     fields: Vec<Field>,
     ranks: Option<&'static Ranks>,
     iterations: u32,
+    ends_passes: bool,
     samples: u32,
 }
 
@@ -62,6 +63,11 @@ impl Declaration {
     /// Loop iterations that a fragment takes, at most.
     pub fn iterations(&mut self, count: u32) {
         self.iterations += count;
+    }
+
+    /// There is something to do when all fragments of a pass have been drawn.
+    pub fn ends_passes(&mut self) {
+        self.ends_passes = true;
     }
 
     /// A constant beside those of the parameters.
@@ -171,6 +177,8 @@ pub struct Port {
     pub ranks: Option<&'static Ranks>,
     /// Loop iterations that a fragment takes, at most.
     pub iterations: u32,
+    /// Whether there is something to do when all fragments of a pass have been drawn.
+    pub ends_passes: bool,
     /// Whether threads may be given samples in place of pixels.
     pub by_sample: bool,
     /// Whether the device's own resolve gives the plain text's bits: a box filter in
@@ -205,6 +213,7 @@ impl Port {
             fields: declared.fields,
             ranks: declared.ranks,
             iterations: declared.iterations,
+            ends_passes: declared.ends_passes,
             by_sample: false,
             resolves: false,
             plain: Box::new(plain),

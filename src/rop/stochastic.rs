@@ -506,6 +506,9 @@ where
         to.field("TRANSMITTANCE", sums * samples);
         to.field("OCCUPIED", sums * samples.div_ceil(32));
         to.field("SUM", sums * 4);
+        if self.has_sums() {
+            to.ends_passes();
+        }
         // The depth test, writing or multiplying.
         to.iterations(2 * samples);
         self.sampler.declare(to);

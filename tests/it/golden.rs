@@ -10,9 +10,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use screendoor::capture::{Capture, CaptureOptions, Order};
-use screendoor::trace::{Compression, Trace, TraceWriter, WriteOptions};
+use screendoor::gpu::capture::GpuCapture;
+use screendoor::trace::{Compression, Fragment, Trace, TraceWriter, WriteOptions};
 
-use crate::util::{all_variants, picture};
+use crate::util::{all_variants, gpu, picture};
 
 /// A trace of the folder: its name, its scene, and how it is captured.
 struct Golden {
@@ -33,6 +34,9 @@ const TRACES: [Golden; 8] = [
     Golden { name: "foliage", scene: "builtin:foliage:cards=500", order: Order::NearToFar },
     Golden { name: "glass", scene: "builtin:glass", order: Order::Api },
 ];
+
+/// The trace that a GPU has captured, at 4 samples.
+const BY_GPU: Golden = Golden { name: "glass-gpu", scene: "builtin:glass", order: Order::Api };
 
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("traces")
@@ -75,6 +79,10 @@ impl Golden {
     }
 }
 
+fn by_gpu_options() -> CaptureOptions {
+    CaptureOptions { width: SIDE, height: SIDE, samples: 4, ..CaptureOptions::default() }
+}
+
 fn readme(contents: &[(u64, String)]) -> String {
     let mut text = String::from(
         "# Traces\n\n\
@@ -92,7 +100,22 @@ fn readme(contents: &[(u64, String)]) -> String {
             golden.command()
         );
     }
+    let (rows, content) = summary(&BY_GPU);
+    let _ = write!(
+        text,
+        "\nCaptured by a GPU, the one that the trace names; a test holds it against our own rasteriser's\n\
+         capture, and where that GPU is found captures it again:\n\n\
+         | trace | fragments | content hash | made by |\n|---|---:|---|---|\n\
+         | {}.arrow | {rows} | `{content}` | `{} --gpu` |\n",
+        BY_GPU.name,
+        BY_GPU.command()
+    );
     text
+}
+
+fn summary(golden: &Golden) -> (u64, String) {
+    let trace = Trace::open(golden.path()).unwrap();
+    (trace.rows(), trace.content().unwrap().to_string())
 }
 
 /// The hashes of all pictures: trace, design, samples, seed, hash.
@@ -113,11 +136,27 @@ fn pictures() -> String {
 }
 
 fn on_disk() -> Vec<(u64, String)> {
-    let summary = |golden: &Golden| {
-        let trace = Trace::open(golden.path()).unwrap();
-        (trace.rows(), trace.content().unwrap().to_string())
-    };
     TRACES.iter().map(summary).collect()
+}
+
+#[test]
+fn the_gpu_s_trace_is_what_our_rasteriser_finds() {
+    let trace = Trace::open(BY_GPU.path()).unwrap();
+    assert_eq!(trace.verify(|_| ()).unwrap(), summary(&BY_GPU).1);
+    let (scene, options) = (screendoor::scene::load(BY_GPU.scene).unwrap(), by_gpu_options());
+    let ours = Capture::new(&scene, &options).unwrap().to_memory(|_, _| ()).unwrap();
+    assert_eq!(trace.header().pattern, ours.header().pattern);
+    let all = |trace: &Trace| -> Vec<Fragment> {
+        trace.batches().flat_map(|batch| batch.unwrap().iter().collect::<Vec<_>>()).collect()
+    };
+    assert_eq!(all(&trace), all(&ours));
+
+    let Some(gpu) = gpu() else { return };
+    let found = GpuCapture::new(gpu, &scene, &options).unwrap();
+    if found.header() == trace.header() {
+        let again = found.to_memory(|_, _| ()).unwrap();
+        assert_eq!(again.content().unwrap(), trace.content().unwrap());
+    }
 }
 
 #[test]
@@ -146,6 +185,15 @@ fn the_pictures_are_the_golden_ones() {
 fn write_golden() {
     for golden in &TRACES {
         fs::write(golden.path(), golden.capture().0).unwrap();
+    }
+    if let Some(gpu) = gpu() {
+        let (scene, options) = (screendoor::scene::load(BY_GPU.scene).unwrap(), by_gpu_options());
+        let capture = GpuCapture::new(gpu, &scene, &options).unwrap();
+        let write = WriteOptions { compression: Compression::Zstd, ..WriteOptions::default() };
+        let header = capture.header().clone();
+        let mut writer = TraceWriter::new(Vec::new(), BY_GPU.name, header, write).unwrap();
+        capture.draw(&mut writer, |_, _| ()).unwrap();
+        fs::write(BY_GPU.path(), writer.finish().unwrap().0).unwrap();
     }
     fs::write(folder().join("README.md"), readme(&on_disk())).unwrap();
     fs::write(folder().join("golden.txt"), pictures()).unwrap();

@@ -17,14 +17,17 @@ const FLOW: &[(&str, &[&str])] = &[
     ("capture", &["scene", "trace"]),
     ("resolve", &[]),
     ("rop", &["trace", "picture", "resolve"]),
-    ("gpu", &["trace", "picture", "rop"]),
+    ("gpu", &["scene", "capture", "trace", "picture", "rop"]),
     ("design", &["rop", "trace", "resolve", "gpu"]),
     ("metrics", &["trace", "picture"]),
     ("study", &["scene", "capture", "trace", "rop", "gpu", "design", "metrics", "picture"]),
     ("report", &["study", "metrics", "picture"]),
     (
         "cli",
-        &["scene", "capture", "trace", "rop", "design", "metrics", "picture", "study", "report"],
+        &[
+            "scene", "capture", "trace", "rop", "gpu", "design", "metrics", "picture", "study",
+            "report",
+        ],
     ),
 ];
 

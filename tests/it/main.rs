@@ -7,6 +7,7 @@ mod events;
 mod fast;
 mod golden;
 mod gpu;
+mod gpu_capture;
 mod guarantees;
 mod hostile;
 mod large;
