@@ -138,12 +138,8 @@ impl Gpu {
             keep(&kept, found);
         }));
         let kept = fault.clone();
-        device.set_device_lost_callback(move |reason, why| {
-            // A device that is dropped is lost as well.
-            if reason != wgpu::DeviceLostReason::Destroyed {
-                keep(&kept, Fault::Lost(why));
-            }
-        });
+        // One that is dropped is lost as well; then nobody asks any more.
+        device.set_device_lost_callback(move |_, why| keep(&kept, Fault::Lost(why)));
         Ok(Gpu { device, queue, adapter, fault, pipelines: Mutex::default() })
     }
 
@@ -170,6 +166,17 @@ impl Gpu {
     /// An error on this adapter.
     pub(super) fn error(&self, what: impl fmt::Display, hint: impl fmt::Display) -> Error {
         Error::gpu(&self.adapter, what, hint)
+    }
+
+    /// Why memory could not be reached: what went wrong on the device, if it knows.
+    fn failed(&self, doing: &str, why: &dyn fmt::Display) -> Error {
+        // A device tells that it is lost when it is asked.
+        let polled = self.device.poll(wgpu::PollType::Poll);
+        let cause = self.check(doing).err();
+        cause.unwrap_or_else(|| match polled {
+            Err(e) => self.error(format_args!("{doing} failed: {e}"), "try again"),
+            Ok(_) => self.error(format_args!("{doing} failed: {why}"), "try again"),
+        })
     }
 
     /// Whether all went well until now.
@@ -257,8 +264,7 @@ impl Gpu {
         self.check(&format!("making room for {label}"))?;
         {
             let view = buffer.get_mapped_range_mut(..);
-            let mut view = view
-                .map_err(|e| self.error(format_args!("no room for {label}: {e}"), "try again"))?;
+            let mut view = view.map_err(|e| self.failed(&format!("uploading {label}"), &e))?;
             fill(view.slice(..))?;
         }
         buffer.unmap();
@@ -401,15 +407,12 @@ impl Gpu {
             let _ = sender.send(result);
         });
         self.wait(doing)?;
-        let failed = |why: &dyn fmt::Display| {
-            self.error(format_args!("{doing}: its memory cannot be read: {why}"), "try again")
-        };
         match receiver.recv() {
             Ok(Ok(())) => {}
-            Ok(Err(e)) => return Err(failed(&e)),
-            Err(e) => return Err(failed(&e)),
+            Ok(Err(e)) => return Err(self.failed(doing, &e)),
+            Err(e) => return Err(self.failed(doing, &e)),
         }
-        let view = copy.get_mapped_range(..).map_err(|e| failed(&e))?;
+        let view = copy.get_mapped_range(..).map_err(|e| self.failed(doing, &e))?;
         Ok(look(bytemuck::cast_slice(&view)))
     }
 

@@ -57,7 +57,10 @@ fn samples_write(f: Fragment, row: u32, written: Mask, bits: u32) {
 fn place_among(list: Mask, sample: u32, sorted: bool) -> u32 {
     var before = 0u;
     for (var s = 0u; s < SAMPLES; s++) {
-        let nearer = select(s < sample, depth[s] < depth[sample] || (depth[s] == depth[sample] && s < sample), sorted);
+        var nearer = s < sample;
+        if sorted {
+            nearer = depth[s] < depth[sample] || (depth[s] == depth[sample] && nearer);
+        }
         before += select(0u, 1u, mask_contains(list, s) && nearer);
     }
     return before;
