@@ -214,16 +214,7 @@ impl Gpu {
         bytes: u64,
         usage: wgpu::BufferUsages,
     ) -> Result<wgpu::Buffer> {
-        self.holds(label, bytes)?;
-        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(label),
-            // Bindings must not be empty.
-            size: bytes.max(4).next_multiple_of(4),
-            usage,
-            mapped_at_creation: false,
-        });
-        self.check(&format!("making room for {label}"))?;
-        Ok(buffer)
+        self.create(label, bytes, usage, false)
     }
 
     /// A buffer that holds `bytes`.
@@ -254,14 +245,7 @@ impl Gpu {
         usage: wgpu::BufferUsages,
         fill: impl FnOnce(wgpu::WriteOnly<'_, [u8]>) -> Result<()>,
     ) -> Result<wgpu::Buffer> {
-        self.holds(label, bytes)?;
-        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(label),
-            size: bytes.max(4).next_multiple_of(4),
-            usage,
-            mapped_at_creation: true,
-        });
-        self.check(&format!("making room for {label}"))?;
+        let buffer = self.create(label, bytes, usage, true)?;
         {
             let view = buffer.get_mapped_range_mut(..);
             let mut view = view.map_err(|e| self.failed(&format!("uploading {label}"), &e))?;
@@ -272,17 +256,31 @@ impl Gpu {
         Ok(buffer)
     }
 
-    /// Whether a buffer of this size can be bound.
-    fn holds(&self, label: &str, bytes: u64) -> Result<()> {
+    /// A buffer, mapped so that it can be filled or not.
+    fn create(
+        &self,
+        label: &str,
+        bytes: u64,
+        usage: wgpu::BufferUsages,
+        mapped_at_creation: bool,
+    ) -> Result<wgpu::Buffer> {
         let limits = self.limits();
         let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        if bytes <= most {
-            return Ok(());
+        if bytes > most {
+            return Err(self.error(
+                format_args!("{label} take {bytes} bytes, and a buffer holds {most} at most"),
+                "do without the GPU",
+            ));
         }
-        Err(self.error(
-            format_args!("{label} take {bytes} bytes, and a buffer holds {most} at most"),
-            "do without the GPU",
-        ))
+        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            // Bindings must not be empty.
+            size: bytes.max(4).next_multiple_of(4),
+            usage,
+            mapped_at_creation,
+        });
+        self.check(&format!("making room for {label}"))?;
+        Ok(buffer)
     }
 
     /// The program `entry` of a shader; compiled once.

@@ -92,16 +92,24 @@ struct Ready {
     sorted: Sorted,
 }
 
+/// A program of a design.
+struct Program {
+    /// As what its time is counted.
+    name: &'static str,
+    pipeline: wgpu::ComputePipeline,
+    /// Pixels that a group is given.
+    pixels: usize,
+}
+
 /// The design's programs.
 struct Programs {
     layout: wgpu::BindGroupLayout,
-    clear: wgpu::ComputePipeline,
-    draw: wgpu::ComputePipeline,
-    /// Pixels that a group draws, and how many fragments of each at a time.
-    drawn: usize,
+    clear: Program,
+    draw: Program,
+    /// How many fragments of each pixel are drawn at a time.
     fragments: u32,
-    end_pass: wgpu::ComputePipeline,
-    resolve: Option<wgpu::ComputePipeline>,
+    end_pass: Option<Program>,
+    resolve: Option<Program>,
     tables: wgpu::Buffer,
     /// What is bound where a program looks at nothing: to read from, and to write to.
     nothing: [wgpu::Buffer; 2],
@@ -131,25 +139,27 @@ impl Programs {
         let bindings: Vec<Binding> =
             bindings.map(|(i, access)| Binding { number: i as u32, access: *access }).collect();
         let layout = gpu.layout(&bindings);
-        let program = |entry| gpu.pipeline(&source, entry, &layout);
+        let program = |name| -> Result<Program> {
+            Ok(Program { name, pipeline: gpu.pipeline(&source, name, &layout)?, pixels: GROUP })
+        };
         let by_sample = threads == Threads::Sample && port.by_sample;
-        let (draw, drawn, iterations) = if by_sample {
+        let (draw, iterations) = if by_sample {
             let file = lanes_file(gpu, samples);
             let source = self::source(&[port.program, file], port, samples, chunks.types());
+            let pipeline = gpu.pipeline(&source, "draw_lanes", &layout)?;
             // Two loops over the samples, and what a reference value may take.
             let iterations = 2 * samples + u32::BITS;
-            (gpu.pipeline(&source, "draw_lanes", &layout)?, GROUP / samples as usize, iterations)
+            (Program { name: "draw", pipeline, pixels: GROUP / samples as usize }, iterations)
         } else {
-            (program("draw")?, GROUP, port.iterations)
+            (program("draw")?, port.iterations)
         };
         let storage = wgpu::BufferUsages::STORAGE;
         Ok(Programs {
             clear: program("clear")?,
             draw,
-            drawn,
             fragments: (ITERATIONS / (iterations + 1)).max(1),
-            end_pass: program("end_pass")?,
-            resolve: if port.resolves { Some(program("resolve")?) } else { None },
+            end_pass: port.ends_passes.then(|| program("end_pass")).transpose()?,
+            resolve: port.resolves.then(|| program("resolve")).transpose()?,
             tables: gpu.filled(
                 "tables",
                 bytemuck::cast_slice(&tables(port, frame)),
@@ -268,8 +278,8 @@ impl<'a> GpuRun<'a> {
                 done += chunks.rows(i) as u64;
                 (options.progress)(done, total);
             }
-            if self.port.ends_passes {
-                self.for_all_pages("end of pass", |run| &run.programs.end_pass, None)?;
+            if let Some(program) = &self.programs.end_pass {
+                self.for_all_pages(program, None)?;
             }
         }
         Ok(())
@@ -304,7 +314,7 @@ impl<'a> GpuRun<'a> {
             let state = self.gpu.buffer("state", 4 * words * tiles as u64, usage)?;
             self.pages.push(Page { state, first: at, tiles });
             let page = self.pages.len() - 1;
-            self.run_on(page, "clear", &self.programs.clear, None, None)?;
+            self.run_on(page, &self.programs.clear, None, None)?;
             at += tiles;
         }
         Ok(())
@@ -332,27 +342,21 @@ impl<'a> GpuRun<'a> {
             let mut part = chunk.uploaded.params;
             part.from_fragment = from;
             part.fragments = fragments;
-            self.for_all_pages("draw", |run| &run.programs.draw, Some((chunk, part)))?;
+            self.for_all_pages(&self.programs.draw, Some((chunk, part)))?;
         }
         Ok(())
     }
 
-    fn for_all_pages(
-        &self,
-        name: &'static str,
-        pipeline: impl Fn(&Self) -> &wgpu::ComputePipeline,
-        chunk: Option<(&Ready, Params)>,
-    ) -> Result<()> {
+    fn for_all_pages(&self, program: &Program, chunk: Option<(&Ready, Params)>) -> Result<()> {
         let mut pages = 0..self.pages.len();
-        pages.try_for_each(|page| self.run_on(page, name, pipeline(self), chunk, None))
+        pages.try_for_each(|page| self.run_on(page, program, chunk, None))
     }
 
     /// Runs a program for the pixels of a page, as far as the chunk knows them.
     fn run_on(
         &self,
         page: usize,
-        name: &'static str,
-        pipeline: &wgpu::ComputePipeline,
+        program: &Program,
         chunk: Option<(&Ready, Params)>,
         picture: Option<&wgpu::Buffer>,
     ) -> Result<()> {
@@ -386,13 +390,12 @@ impl<'a> GpuRun<'a> {
         let bound = self.gpu.bind(&self.programs.layout, &buffers);
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         {
-            let mut pass = self.timer.pass(&mut encoder, name);
-            pass.set_pipeline(pipeline);
+            let mut pass = self.timer.pass(&mut encoder, program.name);
+            pass.set_pipeline(&program.pipeline);
             pass.set_bind_group(0, &bound, &[]);
-            let each = if name == "draw" { self.programs.drawn } else { GROUP };
-            dispatch(self.gpu, &mut pass, taken.div_ceil(each) as u64);
+            dispatch(self.gpu, &mut pass, taken.div_ceil(program.pixels) as u64);
         }
-        self.gpu.submit(encoder, name)
+        self.gpu.submit(encoder, program.name)
     }
 
     /// How many tiles hold a fragment.
@@ -456,13 +459,13 @@ impl<'a> GpuRun<'a> {
         Ok(Picture::from_tiles(self.frame.background.map(f64::from), finished))
     }
 
-    fn resolved(&self, program: &wgpu::ComputePipeline) -> Result<Vec<(TileId, TilePixels)>> {
+    fn resolved(&self, program: &Program) -> Result<Vec<(TileId, TilePixels)>> {
         let mut all = Vec::with_capacity(self.tiles.len());
         for (i, page) in self.pages.iter().enumerate() {
             let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
             let bytes = (12 * page.tiles * TILE_PIXELS) as u64;
             let picture = self.gpu.buffer("the picture", bytes, usage)?;
-            self.run_on(i, "resolve", program, None, Some(&picture))?;
+            self.run_on(i, program, None, Some(&picture))?;
             let tiles = &self.tiles[page.first..page.first + page.tiles];
             self.gpu.read(&picture, "bringing the picture back", |words| {
                 for (tile, words) in tiles.iter().zip(words.chunks_exact(3 * TILE_PIXELS)) {

@@ -27,6 +27,7 @@ files![
     "lanes",
     "lanes_subgroup",
     "lanes_workgroup",
+    "layered",
     "layers",
     "lk",
     "longest",

@@ -74,7 +74,8 @@ fn held(row: u32) -> bool {
 }
 
 fn put_counts(block: u32, thread: u32) {
-    if thread < DIGITS / 2u {
+    // There may be more groups than blocks.
+    if thread < DIGITS / 2u && block < params.blocks {
         let sum = tally_sum(thread);
         counts[2u * thread * params.blocks + block] = sum & 0xffffu;
         counts[(2u * thread + 1u) * params.blocks + block] = sum >> 16u;
@@ -90,6 +91,38 @@ fn next_place(digit: u32, block: u32, thread: u32) -> u32 {
     return counts[digit * params.blocks + block] + place;
 }
 
+// Counts a thread's keys: of rows, or of `total` keys.
+fn tally_rows(first: u32, thread: u32) {
+    tally_clear(thread);
+    for (var row = first; row < first + KEYS_EACH; row++) {
+        if held(row) {
+            tally_key(key_of(row), thread);
+        }
+    }
+}
+
+fn tally_keys(first: u32, total: u32, thread: u32) {
+    tally_clear(thread);
+    for (var i = first; i < min(first + KEYS_EACH, total); i++) {
+        tally_key(keys_from[i], thread);
+    }
+}
+
+// When all threads have counted: what come before each of theirs.
+fn tally_before(thread: u32) {
+    workgroupBarrier();
+    if thread < DIGITS / 2u {
+        let ignored = tally_sum(thread);
+    }
+    workgroupBarrier();
+}
+
+fn put_key(key: u32, row: u32, block: u32, thread: u32) {
+    let place = next_place(digit_of(key), block, thread);
+    keys_to[place] = key;
+    rows_to[place] = row;
+}
+
 @compute @workgroup_size(GROUP)
 fn count_rows(
     @builtin(workgroup_id) group: vec3<u32>,
@@ -97,17 +130,9 @@ fn count_rows(
     @builtin(local_invocation_index) thread: u32,
 ) {
     let block = group.y * groups.x + group.x;
-    tally_clear(thread);
-    let first = first_key(block, thread);
-    for (var row = first; row < first + KEYS_EACH; row++) {
-        if held(row) {
-            tally_key(key_of(row), thread);
-        }
-    }
+    tally_rows(first_key(block, thread), thread);
     workgroupBarrier();
-    if block < params.blocks {
-        put_counts(block, thread);
-    }
+    put_counts(block, thread);
 }
 
 @compute @workgroup_size(GROUP)
@@ -117,24 +142,12 @@ fn scatter_rows(
     @builtin(local_invocation_index) thread: u32,
 ) {
     let block = group.y * groups.x + group.x;
-    tally_clear(thread);
     let first = first_key(block, thread);
+    tally_rows(first, thread);
+    tally_before(thread);
     for (var row = first; row < first + KEYS_EACH; row++) {
         if held(row) {
-            tally_key(key_of(row), thread);
-        }
-    }
-    workgroupBarrier();
-    if thread < DIGITS / 2u {
-        let ignored = tally_sum(thread);
-    }
-    workgroupBarrier();
-    for (var row = first; row < first + KEYS_EACH; row++) {
-        if held(row) {
-            let key = key_of(row);
-            let place = next_place(digit_of(key), block, thread);
-            keys_to[place] = key;
-            rows_to[place] = row;
+            put_key(key_of(row), row, block, thread);
         }
     }
     if block == 0u && thread == 0u {
@@ -149,16 +162,9 @@ fn count_keys(
     @builtin(local_invocation_index) thread: u32,
 ) {
     let block = group.y * groups.x + group.x;
-    let total = keys_from[params.rows];
-    tally_clear(thread);
-    let first = first_key(block, thread);
-    for (var i = first; i < min(first + KEYS_EACH, total); i++) {
-        tally_key(keys_from[i], thread);
-    }
+    tally_keys(first_key(block, thread), keys_from[params.rows], thread);
     workgroupBarrier();
-    if block < params.blocks {
-        put_counts(block, thread);
-    }
+    put_counts(block, thread);
 }
 
 @compute @workgroup_size(GROUP)
@@ -168,23 +174,12 @@ fn scatter_keys(
     @builtin(local_invocation_index) thread: u32,
 ) {
     let block = group.y * groups.x + group.x;
-    let total = keys_from[params.rows];
-    tally_clear(thread);
     let first = first_key(block, thread);
-    let end = min(first + KEYS_EACH, total);
-    for (var i = first; i < end; i++) {
-        tally_key(keys_from[i], thread);
-    }
-    workgroupBarrier();
-    if thread < DIGITS / 2u {
-        let ignored = tally_sum(thread);
-    }
-    workgroupBarrier();
-    for (var i = first; i < end; i++) {
-        let key = keys_from[i];
-        let place = next_place(digit_of(key), block, thread);
-        keys_to[place] = key;
-        rows_to[place] = rows_from[i];
+    let total = keys_from[params.rows];
+    tally_keys(first, total, thread);
+    tally_before(thread);
+    for (var i = first; i < min(first + KEYS_EACH, total); i++) {
+        put_key(keys_from[i], rows_from[i], block, thread);
     }
     if block == 0u && thread == 0u {
         keys_to[params.rows] = total;

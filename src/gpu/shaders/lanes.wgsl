@@ -33,14 +33,8 @@ fn lane_test(f: Fragment) -> bool {
 
 // From line 4 on; `passed` are the samples of the pixel that pass the depth test.
 fn lane_draw(f: Fragment, row: u32, passed: Mask) {
-    var s = f.coverage;
-    if COMPACT {
-        s = passed;
-    }
-    var tracked = s;
-    if TRACKS_COVERED {
-        tracked = f.coverage;
-    }
+    let s = numbered_of(f, passed);
+    let tracked = tracked_of(f, s);
     if mask_is_empty(tracked) {
         return;
     }
@@ -51,10 +45,7 @@ fn lane_draw(f: Fragment, row: u32, passed: Mask) {
     let round = round_of(0u);
     let opacity = threshold_of(f.alpha);
     let count = mask_count(s);
-    var key = ReferenceKey(pixel_id, surface_id, round.seed);
-    if PREHASH {
-        key = prehashed(key);
-    }
+    let key = key_of(round);
     references_begin(round, key, opacity, numbered, count);
     if mask_contains(s & passed, lane) {
         if passes(opacity, reference_of(round, key, opacity, numbered, place)) {

@@ -24,17 +24,34 @@ fn sampler_store() {
     references_store();
 }
 
+// The samples of a fragment that are numbered, and of these or all those that are tracked.
+fn numbered_of(f: Fragment, passed: Mask) -> Mask {
+    if COMPACT {
+        return passed;
+    }
+    return f.coverage;
+}
+
+fn tracked_of(f: Fragment, s: Mask) -> Mask {
+    if TRACKS_COVERED {
+        return f.coverage;
+    }
+    return s;
+}
+
+fn key_of(round: Round) -> ReferenceKey {
+    let key = ReferenceKey(pixel_id, surface_id, round.seed);
+    if PREHASH {
+        return prehashed(key);
+    }
+    return key;
+}
+
 // From line 4 of the figure to the opacity test; numbers are the figure's lines.
 fn choose(round: Round, passed: Mask, f: Fragment) -> Mask {
     let opacity = threshold_of(f.alpha);
-    var s = f.coverage;
-    if COMPACT {
-        s = passed;
-    }
-    var tracked = s;
-    if TRACKS_COVERED {
-        tracked = f.coverage;
-    }
+    let s = numbered_of(f, passed);
+    let tracked = tracked_of(f, s);
     if mask_is_empty(tracked) {
         return MASK_NONE;
     }
@@ -46,10 +63,7 @@ fn choose(round: Round, passed: Mask, f: Fragment) -> Mask {
 
     // 9-17: a sample's number is its place in the order, after those that came before.
     let count = mask_count(s);
-    var key = ReferenceKey(pixel_id, surface_id, round.seed);
-    if PREHASH {
-        key = prehashed(key);
-    }
+    let key = key_of(round);
     references_begin(round, key, opacity, numbered, count);
     var written = MASK_NONE;
     for (var sample = 0u; sample < SAMPLES; sample++) {
