@@ -59,8 +59,10 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     for count in &arguments.samples {
         trace.header().pattern.prefix(*count)?;
     }
+    // An adapter is for the GPU among the engines; without one it is a mistake.
+    let has_gpu = arguments.engines.contains(&EngineName::Gpu);
     let open = |name: &EngineName| {
-        let adapter = arguments.adapter.as_deref().filter(|_| *name == EngineName::Gpu);
+        let adapter = arguments.adapter.as_deref().filter(|_| *name == EngineName::Gpu || !has_gpu);
         Ok((*name, name.open(adapter)?.with_threads(arguments.gpu_threads)))
     };
     let engines = arguments.engines.iter().map(open).collect::<Result<Vec<_>>>()?;

@@ -120,6 +120,9 @@ struct Programs {
 /// seconds.
 const ITERATIONS: u32 = 60_000;
 
+/// Rows of a chunk, at most, whatever a buffer holds: shaders count them in 32 bits.
+const MAX_ROWS: u64 = 1 << 30;
+
 /// Threads of a group of `shaders/replay.wgsl`.
 const GROUP: usize = 64;
 
@@ -219,7 +222,7 @@ impl<'a> GpuRun<'a> {
         let limits = gpu.limits();
         let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         // Behind the keys stands their number.
-        let chunks = Chunks::of(trace, bytes, options.rows.min(bytes / 4 - 1));
+        let chunks = Chunks::of(trace, bytes, options.rows.min(bytes / 4 - 1).min(MAX_ROWS));
         let mut run = GpuRun {
             gpu,
             port,

@@ -64,6 +64,10 @@ fn a_gpu_that_is_not_there_is_told() {
     let (code, error) = place.bad(&["replay", "t.arrow", "--adapter", "x"]);
     assert_eq!(code, 2);
     assert!(error.contains("add --engine gpu"), "{error}");
+    let (code, error) =
+        place.bad(&["throughput", "t.arrow", "--engines", "fast", "--adapter", "x"]);
+    assert_eq!(code, 2);
+    assert!(error.contains("add --engine gpu"), "{error}");
     let (code, error) = place.bad(&["replay", "t.arrow", "--engine", "cpu"]);
     assert_eq!(code, 2);
     assert!(error.contains("possible values") && error.contains("gpu"), "{error}");
