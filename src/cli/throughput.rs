@@ -98,30 +98,46 @@ fn milliseconds(spread: Option<Spread>) -> String {
         .map_or_else(String::new, |s| format!("{} ({} to {})", ms(s.median), ms(s.low), ms(s.high)))
 }
 
-/// A result as a row of the table.
-fn row(result: &Throughput) -> Vec<String> {
-    let Throughput { fragments, covered, bytes, passes, .. } = result;
-    let (drawn, covered) = (fragments * u64::from(*passes), covered * u64::from(*passes));
-    let gigabytes = |spread: Option<Spread>| {
-        spread.map_or_else(String::new, |s| format!("{:.2}", *bytes as f64 / s.median / 1e9))
-    };
-    let mut row =
-        vec![result.design.clone(), result.samples.to_string(), result.engine.name().to_string()];
+/// What names a result.
+fn names(result: &Throughput) -> Vec<String> {
+    vec![result.design.clone(), result.samples.to_string(), result.engine.name().to_string()]
+}
+
+/// Fragments over all passes.
+fn drawn(result: &Throughput) -> u64 {
+    result.fragments * u64::from(result.passes)
+}
+
+fn gigabytes(result: &Throughput, spread: Option<Spread>) -> String {
+    spread.map_or_else(String::new, |s| format!("{:.2}", result.bytes as f64 / s.median / 1e9))
+}
+
+/// A result as a row of the table of whole replays.
+fn whole(result: &Throughput) -> Vec<String> {
+    let mut row = names(result);
     match &result.missing {
         Some(why) => row.push(why.clone()),
         None => row.extend([
             milliseconds(result.whole),
-            rate(drawn, result.whole),
-            rate(covered, result.whole),
-            gigabytes(result.whole),
-            milliseconds(result.kernel),
-            rate(drawn, result.kernel),
-            gigabytes(result.kernel),
-            milliseconds(result.bin),
-            milliseconds(result.upload),
-            milliseconds(result.back),
+            rate(drawn(result), result.whole),
+            rate(result.covered * u64::from(result.passes), result.whole),
+            gigabytes(result, result.whole),
         ]),
     }
+    row
+}
+
+/// A result as a row of the table of what a GPU does.
+fn on_gpu(result: &Throughput) -> Vec<String> {
+    let mut row = names(result);
+    row.extend([
+        milliseconds(result.kernel),
+        rate(drawn(result), result.kernel),
+        gigabytes(result, result.kernel),
+        milliseconds(result.bin),
+        milliseconds(result.upload),
+        milliseconds(result.back),
+    ]);
     row
 }
 
@@ -136,25 +152,27 @@ fn print(document: &Document<'_>, console: &Console) -> Result<()> {
     if let Some(adapter) = document.adapter {
         console.print(format_args!("GPU: {}", shown(adapter.to_string())))?;
     }
-    let header = [
-        "design",
-        "samples",
-        "engine",
-        "whole, ms",
-        "M frag/s",
-        "M samples/s",
-        "GB/s",
-        "kernel, ms",
-        "M frag/s",
-        "GB/s",
-        "sorting, ms",
-        "upload, ms",
-        "back, ms",
-    ];
-    let table = table(&header, document.results.iter().map(row).collect());
-    console.print(format_args!("{table}"))?;
+    let header = ["design", "samples", "engine", "whole, ms", "M frag/s", "M samples/s", "GB/s"];
+    let rows = document.results.iter().map(whole).collect();
+    console.print(format_args!("\n{}", table(&header, rows)))?;
+    let of_gpu: Vec<_> =
+        document.results.iter().filter(|r| r.upload.is_some()).map(on_gpu).collect();
+    if !of_gpu.is_empty() {
+        let header = [
+            "design",
+            "samples",
+            "engine",
+            "kernel, ms",
+            "M frag/s",
+            "GB/s",
+            "sorting, ms",
+            "upload, ms",
+            "back, ms",
+        ];
+        console.print(format_args!("\n{}", table(&header, of_gpu)))?;
+    }
     console.print(format_args!(
-        "medians (quartiles) of several replays; kernel and sorting by the GPU's own clock; \
+        "\nmedians (quartiles) of several replays; kernel and sorting by the GPU's own clock; \
          bytes are those that must move: columns and state, once a pass"
     ))
 }
