@@ -132,9 +132,8 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     // No file appears unless all could be written.
     let saved = write_pictures(&mut files, &first.picture, reference.as_ref())
         .and_then(|()| files.into_iter().try_for_each(PictureFile::commit));
-    let drawn = |gpu: &OnGpu| gpu.fragments;
     let counted = first.events.as_ref().map_or(0, |events| events.fragments);
-    let fragments = gpu.as_ref().map_or(counted, drawn);
+    let fragments = gpu.as_ref().map_or(counted, |gpu| gpu.fragments);
     let document = Document {
         trace: trace.place(),
         content: trace.content(),
@@ -211,11 +210,14 @@ fn print_gpu(gpu: &OnGpu, console: &Console) -> Result<()> {
     console.print(format_args!("on {}", shown(gpu.adapter.to_string())))?;
     let ms = |seconds: f64| format!("{:.1} ms", seconds * 1e3);
     let seconds = &gpu.seconds;
-    let mut parts =
-        vec![format!("upload {}", ms(seconds.upload)), format!("back {}", ms(seconds.back))];
     let device = seconds.device.iter().flatten();
-    parts.extend(device.map(|(name, s)| format!("{name} {} by its own clock", ms(*s))));
-    console.print(format_args!("  {}", parts.join(", ")))
+    let parts: Vec<String> = device.map(|(name, s)| format!("{name} {}", ms(*s))).collect();
+    let told = if parts.is_empty() { "nothing".to_string() } else { parts.join(", ") };
+    console.print(format_args!(
+        "  upload {}, back {}; by its own clock: {told}",
+        ms(seconds.upload),
+        ms(seconds.back)
+    ))
 }
 
 fn print_errors(errors: &ErrorsByRegion, console: &Console) -> Result<()> {
