@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::gpu::chunk::Uploaded;
-use crate::gpu::device::{Access, Binding, Gpu};
+use crate::gpu::device::{Access, Gpu};
 use crate::gpu::params::Params;
 use crate::gpu::shader;
 use crate::gpu::time::Timer;
@@ -92,13 +92,8 @@ impl Binner {
     /// # Errors
     /// As [`Gpu::pipeline`].
     pub fn new(gpu: &Gpu, samples: u32, constants: &[(String, Constant)]) -> Result<Self> {
-        let buffers = |numbers: &[(u32, Access)]| {
-            let binding =
-                |(number, access): &(u32, Access)| Binding { number: *number, access: *access };
-            gpu.layout(&numbers.iter().map(binding).collect::<Vec<_>>())
-        };
         use Access::{Read, Uniform, Write};
-        let layout = buffers(&[
+        let layout = gpu.layout(&[
             (0, Uniform),
             (1, Read),
             (3, Read),
@@ -109,8 +104,8 @@ impl Binner {
             (8, Write),
             (9, Write),
         ]);
-        let scan_layout = buffers(&[(0, Uniform), (1, Write), (2, Write)]);
-        let touch_layout = buffers(&[(0, Uniform), (1, Read), (3, Write)]);
+        let scan_layout = gpu.layout(&[(0, Uniform), (1, Write), (2, Write)]);
+        let touch_layout = gpu.layout(&[(0, Uniform), (1, Read), (3, Write)]);
         let (bin, scan) = (
             shader::program(&["bin"], samples, constants),
             shader::program(&["scan"], samples, &[]),
@@ -154,14 +149,11 @@ impl Binner {
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
         let touched = gpu.buffer("touched tiles", 4 * tiles.div_ceil(32) as u64, usage)?;
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        {
-            let uniform = uniform(gpu, &chunk.params)?;
-            let mut pass = timer.pass(&mut encoder, "bin");
-            pass.set_pipeline(&self.touch);
-            let buffers = [(0, &uniform), (1, &chunk.columns), (3, &touched)];
-            pass.set_bind_group(0, &gpu.bind(&self.touch_layout, &buffers), &[]);
-            dispatch(gpu, &mut pass, u64::from(chunk.params.rows).div_ceil(256));
-        }
+        let uniform = uniform(gpu, &chunk.params)?;
+        let buffers = [(0, &uniform), (1, &chunk.columns), (3, &touched)];
+        let bound = gpu.bind(&self.touch_layout, &buffers);
+        let groups = u64::from(chunk.params.rows).div_ceil(256);
+        timer.run(gpu, &mut encoder, "bin", (&self.touch, &bound), groups);
         gpu.submit(encoder, "finding the touched tiles")?;
         gpu.read(&touched, "finding the touched tiles", <[u32]>::to_vec)
     }
@@ -213,16 +205,10 @@ impl Binner {
                 ],
             );
             let [count, scatter] = if digit == 0 { &self.first } else { &self.next };
-            let program = |encoder: &mut _, pipeline, groups| {
-                let mut pass = timer.pass(encoder, "bin");
-                pass.set_pipeline(pipeline);
-                pass.set_bind_group(0, &bound, &[]);
-                dispatch(gpu, &mut pass, groups);
-            };
             encoder.clear_buffer(&scratch.counts, 0, None);
-            program(&mut encoder, count, blocks);
+            timer.run(gpu, &mut encoder, "bin", (count, &bound), blocks);
             self.sum(gpu, timer, &mut encoder, scratch, counted(u64::from(chunk.params.rows)))?;
-            program(&mut encoder, scatter, blocks);
+            timer.run(gpu, &mut encoder, "bin", (scatter, &bound), blocks);
         }
         // The sorted keys are read from where the last digit left them.
         let last = (digits as usize - 1) % 2;
@@ -240,12 +226,8 @@ impl Binner {
                 (9, &sorted.ends),
             ],
         );
-        {
-            let mut pass = timer.pass(&mut encoder, "bin");
-            pass.set_pipeline(&self.bound);
-            pass.set_bind_group(0, &bound, &[]);
-            dispatch(gpu, &mut pass, u64::from(chunk.params.rows).div_ceil(256));
-        }
+        let groups = u64::from(chunk.params.rows).div_ceil(256);
+        timer.run(gpu, &mut encoder, "bin", (&self.bound, &bound), groups);
         let usage = wgpu::BufferUsages::STORAGE
             | wgpu::BufferUsages::COPY_SRC
             | wgpu::BufferUsages::COPY_DST;
@@ -255,12 +237,7 @@ impl Binner {
             gpu.filled("parameters", bytemuck::bytes_of(&length), wgpu::BufferUsages::UNIFORM)?;
         let buffers = [(0, &params), (1, &sorted.ends), (2, &longest)];
         let bound = gpu.bind(&self.scan_layout, &buffers);
-        {
-            let mut pass = timer.pass(&mut encoder, "bin");
-            pass.set_pipeline(&self.longest);
-            pass.set_bind_group(0, &bound, &[]);
-            dispatch(gpu, &mut pass, pixels.div_ceil(256));
-        }
+        timer.run(gpu, &mut encoder, "bin", (&self.longest, &bound), pixels.div_ceil(256));
         let behind = 4 * u64::from(chunk.params.rows);
         encoder.copy_buffer_to_buffer(&scratch.keys[last], behind, &longest, 4, 4);
         gpu.submit(encoder, "sorting a chunk")?;
@@ -290,10 +267,8 @@ impl Binner {
             let uniform = gpu.filled("parameters", bytemuck::bytes_of(&length), usage)?;
             let buffers = [(0, &uniform), (1, level[0].0), (2, level[1].0)];
             let bound = gpu.bind(&self.scan_layout, &buffers);
-            let mut pass = timer.pass(encoder, "bin");
-            pass.set_pipeline(pipeline);
-            pass.set_bind_group(0, &bound, &[]);
-            dispatch(gpu, &mut pass, level[0].1.div_ceil(SCANNED));
+            let groups = level[0].1.div_ceil(SCANNED);
+            timer.run(gpu, encoder, "bin", (pipeline, &bound), groups);
             Ok(())
         };
         levels.iter().try_for_each(|level| program(&self.scan, level))?;
@@ -306,10 +281,4 @@ impl Binner {
 /// Parameters on the device.
 pub(super) fn uniform(gpu: &Gpu, params: &Params) -> Result<wgpu::Buffer> {
     gpu.filled("parameters", bytemuck::bytes_of(params), wgpu::BufferUsages::UNIFORM)
-}
-
-/// Starts at least `groups` groups.
-pub(super) fn dispatch(gpu: &Gpu, pass: &mut wgpu::ComputePass<'_>, groups: u64) {
-    let [x, y] = gpu.spread(groups);
-    pass.dispatch_workgroups(x, y, 1);
 }

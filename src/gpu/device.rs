@@ -264,8 +264,7 @@ impl Gpu {
         usage: wgpu::BufferUsages,
         mapped_at_creation: bool,
     ) -> Result<wgpu::Buffer> {
-        let limits = self.limits();
-        let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let most = most_bytes(&self.device);
         if bytes > most {
             return Err(self.error(
                 format_args!("{label} take {bytes} bytes, and a buffer holds {most} at most"),
@@ -325,14 +324,13 @@ impl Gpu {
         Ok(pipeline)
     }
 
-    /// The layout of bindings with these numbers, each a storage buffer but for number 0,
-    /// which is a uniform one.
-    pub(super) fn layout(&self, bindings: &[Binding]) -> wgpu::BindGroupLayout {
-        let entry = |binding: &Binding| wgpu::BindGroupLayoutEntry {
-            binding: binding.number,
+    /// The layout of bindings with these numbers.
+    pub(super) fn layout(&self, bindings: &[(u32, Access)]) -> wgpu::BindGroupLayout {
+        let entry = |(binding, access): &(u32, Access)| wgpu::BindGroupLayoutEntry {
+            binding: *binding,
             visibility: wgpu::ShaderStages::COMPUTE,
             ty: wgpu::BindingType::Buffer {
-                ty: match binding.access {
+                ty: match access {
                     Access::Uniform => wgpu::BufferBindingType::Uniform,
                     Access::Read => wgpu::BufferBindingType::Storage { read_only: true },
                     Access::Write => wgpu::BufferBindingType::Storage { read_only: false },
@@ -422,11 +420,10 @@ impl Gpu {
     }
 }
 
-/// A binding of a program.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Binding {
-    pub number: u32,
-    pub access: Access,
+/// The most bytes that a buffer of a device can have and still be bound.
+pub(super) fn most_bytes(device: &wgpu::Device) -> u64 {
+    let limits = device.limits();
+    limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
 }
 
 /// What a program does with a binding.

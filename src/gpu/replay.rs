@@ -8,9 +8,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::error::Result;
-use crate::gpu::bin::{Binner, Scratch, Sorted, dispatch, uniform};
+use crate::gpu::bin::{Binner, Scratch, Sorted, uniform};
 use crate::gpu::chunk::{Chunks, Uploaded};
-use crate::gpu::device::{Access, Binding, Gpu};
+use crate::gpu::device::{Access, Gpu, most_bytes};
 use crate::gpu::params::Params;
 use crate::gpu::shader;
 use crate::gpu::time::Timer;
@@ -138,10 +138,7 @@ impl Programs {
         let source = source(&[port.program], port, samples, chunks.types());
         use Access::{Read, Uniform, Write};
         let bindings = [Uniform, Read, Read, Write, Read, Read, Read, Write];
-        let bindings = bindings.iter().enumerate();
-        let bindings: Vec<Binding> =
-            bindings.map(|(i, access)| Binding { number: i as u32, access: *access }).collect();
-        let layout = gpu.layout(&bindings);
+        let layout = gpu.layout(&(0..).zip(bindings).collect::<Vec<_>>());
         let program = |name| -> Result<Program> {
             Ok(Program { name, pipeline: gpu.pipeline(&source, name, &layout)?, pixels: GROUP })
         };
@@ -163,11 +160,7 @@ impl Programs {
             fragments: (ITERATIONS / (iterations + 1)).max(1),
             end_pass: port.ends_passes.then(|| program("end_pass")).transpose()?,
             resolve: port.resolves.then(|| program("resolve")).transpose()?,
-            tables: gpu.filled(
-                "tables",
-                bytemuck::cast_slice(&tables(port, frame)),
-                wgpu::BufferUsages::STORAGE,
-            )?,
+            tables: gpu.filled("tables", bytemuck::cast_slice(&tables(port, frame)), storage)?,
             nothing: [gpu.buffer("nothing", 8, storage)?, gpu.buffer("nothing", 8, storage)?],
             layout,
         })
@@ -219,8 +212,7 @@ impl<'a> GpuRun<'a> {
         options: &GpuOptions<'_>,
     ) -> Result<Self> {
         let start = Instant::now();
-        let limits = gpu.limits();
-        let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let bytes = most_bytes(&gpu.device);
         // Behind the keys stands their number.
         let chunks = Chunks::of(trace, bytes, options.rows.min(bytes / 4 - 1).min(MAX_ROWS));
         let mut run = GpuRun {
@@ -239,8 +231,6 @@ impl<'a> GpuRun<'a> {
         };
         run.draw_all(trace, &chunks, options)?;
         gpu.wait("drawing")?;
-        run.seconds.device = run.timer.seconds(gpu)?;
-        run.seconds.wall = start.elapsed().as_secs_f64();
         Ok(run)
     }
 
@@ -307,9 +297,7 @@ impl<'a> GpuRun<'a> {
         let usage = wgpu::BufferUsages::STORAGE;
         self.tile_of = self.gpu.filled("tiles", bytemuck::cast_slice(&tiles), usage)?;
         let words = u64::from(self.port.words()) * TILE_PIXELS as u64;
-        let limits = self.gpu.limits();
-        let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        let most = ((bytes / (4 * words.max(3))) as usize).max(1);
+        let most = ((most_bytes(&self.gpu.device) / (4 * words.max(3))) as usize).max(1);
         let mut at = first;
         while at < self.tiles.len() {
             let tiles = most.min(self.tiles.len() - at);
@@ -392,12 +380,9 @@ impl<'a> GpuRun<'a> {
         ];
         let bound = self.gpu.bind(&self.programs.layout, &buffers);
         let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        {
-            let mut pass = self.timer.pass(&mut encoder, program.name);
-            pass.set_pipeline(&program.pipeline);
-            pass.set_bind_group(0, &bound, &[]);
-            dispatch(self.gpu, &mut pass, taken.div_ceil(program.pixels) as u64);
-        }
+        let groups = taken.div_ceil(program.pixels) as u64;
+        let Program { name, pipeline, .. } = program;
+        self.timer.run(self.gpu, &mut encoder, name, (pipeline, &bound), groups);
         self.gpu.submit(encoder, program.name)
     }
 
@@ -411,7 +396,7 @@ impl<'a> GpuRun<'a> {
         self.fragments
     }
 
-    /// Where the time went, until now.
+    /// Where the time went, until the picture was made; before, reading and upload alone.
     pub fn seconds(&self) -> &GpuSeconds {
         &self.seconds
     }

@@ -28,8 +28,25 @@ impl Timer {
         Ok(Timer { queries, names: Mutex::default() })
     }
 
+    /// Starts at least `groups` groups of a program with its bindings, timed as part of
+    /// `name`.
+    pub fn run(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        name: &'static str,
+        (pipeline, bound): (&wgpu::ComputePipeline, &wgpu::BindGroup),
+        groups: u64,
+    ) {
+        let mut pass = self.pass(encoder, name);
+        pass.set_pipeline(pipeline);
+        pass.set_bind_group(0, bound, &[]);
+        let [x, y] = gpu.spread(groups);
+        pass.dispatch_workgroups(x, y, 1);
+    }
+
     /// A pass that is timed as part of `name`.
-    pub fn pass<'e>(
+    fn pass<'e>(
         &self,
         encoder: &'e mut wgpu::CommandEncoder,
         name: &'static str,

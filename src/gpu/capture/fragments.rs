@@ -5,6 +5,7 @@ use std::fmt::Display;
 use bytemuck::{Pod, Zeroable};
 
 use crate::error::{Error, Result};
+use crate::gpu::device::most_bytes;
 use crate::trace::{DepthPlane, Fragment, SampleMask, Unorm32};
 
 /// What a shader that records fragments begins with: `captured_depth` and
@@ -166,9 +167,7 @@ impl FragmentBuffer {
 
     /// How many fragments a buffer of this device can take.
     pub fn most(device: &wgpu::Device) -> u32 {
-        let limits = device.limits();
-        let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        (bytes.saturating_sub(HEAD) / EACH).min(u64::from(u32::MAX >> 1)) as u32
+        (most_bytes(device).saturating_sub(HEAD) / EACH).min(u64::from(u32::MAX >> 1)) as u32
     }
 
     /// How many fragments it has room for.
