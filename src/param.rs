@@ -169,6 +169,15 @@ macro_rules! options {
                 serializer.serialize_str(match self { $($name::$variant => $text),+ })
             }
         }
+
+        impl<'de> serde::Deserialize<'de> for $name {
+            fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                match <String as serde::Deserialize>::deserialize(deserializer)?.as_str() {
+                    $($text => Ok($name::$variant),)+
+                    other => Err(<D::Error as serde::de::Error>::unknown_variant(other, &[$($text),+])),
+                }
+            }
+        }
     };
 }
 

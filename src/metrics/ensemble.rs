@@ -1,6 +1,6 @@
 //! Errors over several seeds, variance and bias apart.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::metrics::{Errors, Estimate, Region, UNIT, errors};
 use crate::picture::{Picture, TilePixels};
@@ -21,7 +21,7 @@ pub struct Ensemble<'a> {
 }
 
 /// The errors of a design over several seeds, in 8-bit units.
-#[derive(Clone, PartialEq, Debug, Serialize)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct EnsembleErrors {
     /// How many seeds.
     pub seeds: usize,

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use fearless_simd::Level;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
 use crate::param::{Param, Values};
@@ -133,7 +133,7 @@ pub trait Design: Send + Sync {
 }
 
 /// Bits of state per pixel, as hardware would hold them.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
 pub struct StateBits {
     /// The multisample buffer: depths and colours of all samples.
     pub samples: u32,

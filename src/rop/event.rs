@@ -1,6 +1,6 @@
 //! What a raster-operations unit does, as countable events.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::rop::opacity::Threshold;
 use crate::trace::{MAX_SAMPLES, SampleMask};
@@ -41,7 +41,7 @@ impl Probe for NoProbe {
 }
 
 /// How often each event happened over a replay.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct EventCounts {
     /// Fragments drawn; over several passes each counts several times.
     pub fragments: u64,
@@ -85,6 +85,14 @@ impl EventCounts {
         self.sorts_by_length.iter().sum()
     }
 
+    /// Comparisons of two depths: one for each sample put to the depth test, and for each
+    /// sort those of Batcher's odd-even merge network of its length.
+    pub fn comparators(&self) -> u64 {
+        let sorts = self.sorts_by_length.iter().enumerate();
+        let sorting = |(length, count): (usize, &u64)| network_comparators(length) * count;
+        self.samples_tested + sorts.map(sorting).sum::<u64>()
+    }
+
     /// Bytes of pixel state read and written.
     pub fn state_bytes(&self) -> [u64; 2] {
         [self.state_bits_read.div_ceil(8), self.state_bits_written.div_ceil(8)]
@@ -110,6 +118,26 @@ impl EventCounts {
         self.state_bits_read += other.state_bits_read;
         self.state_bits_written += other.state_bits_written;
     }
+}
+
+/// Comparators of an odd-even merge sorting network for `length` values (Batcher 1968;
+/// Knuth, The Art of Computer Programming 3, algorithm 5.2.2M).
+fn network_comparators(length: usize) -> u64 {
+    let mut count = 0;
+    let top = length.next_power_of_two() / 2;
+    let mut p = top;
+    while p > 0 {
+        let (mut q, mut r, mut d) = (top, 0, p);
+        loop {
+            count += (0..length.saturating_sub(d)).filter(|i| i & p == r).count() as u64;
+            if q == p {
+                break;
+            }
+            (d, q, r) = (q - p, q / 2, p);
+        }
+        p /= 2;
+    }
+    count
 }
 
 impl Probe for EventCounts {
@@ -232,5 +260,21 @@ impl Probe for Record {
     fn state(&mut self, read: u32, written: u32) {
         self.state_bits_read += read;
         self.state_bits_written += written;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn networks_have_their_known_sizes() {
+        // Knuth 5.3.4, table 1's row for merge exchange; 2^t: (t²−t+4)·2^(t−2) − 1.
+        let known = [0, 0, 1, 3, 5, 9, 12, 16, 19, 26, 31, 37, 41, 48, 53, 59, 63];
+        for (length, count) in known.into_iter().enumerate() {
+            assert_eq!(network_comparators(length), count, "{length}");
+        }
+        assert_eq!(network_comparators(32), 191);
+        assert_eq!(network_comparators(64), 543);
     }
 }

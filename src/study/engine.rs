@@ -1,6 +1,7 @@
 //! What draws: this machine's processor or a GPU.
 
-use serde::{Serialize, Serializer};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::design::Configured;
 use crate::error::{Error, Result};
@@ -57,6 +58,21 @@ impl EngineName {
 impl Serialize for EngineName {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(self.name())
+    }
+}
+
+impl<'de> Deserialize<'de> for EngineName {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let name = String::deserialize(deserializer)?;
+        let named = EngineName::all().find(|(_, choice)| choice.name == name);
+        named.map(|(engine, _)| engine).ok_or_else(|| {
+            let known: Vec<String> =
+                EngineName::all().map(|(_, choice)| format!("`{}`", choice.name)).collect();
+            D::Error::custom(format_args!(
+                "unknown variant `{name}`, expected one of {}",
+                known.join(", ")
+            ))
+        })
     }
 }
 

@@ -2,7 +2,10 @@
 
 pub mod comparison;
 pub mod engine;
+pub mod file;
 pub mod publications;
+pub mod record;
+pub mod results;
 pub mod throughput;
 
 use std::time::Instant;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
 use crate::tile::{TILE_PIXELS, TileGrid, TileMap};
@@ -14,7 +14,7 @@ const MAX_OBJECTS: usize = 1 << 16;
 pub const ALPHA_BINS: usize = 10;
 
 /// A trace in numbers.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Statistics {
     /// How many fragments.
     pub fragments: u64,
@@ -39,7 +39,7 @@ pub struct Statistics {
 }
 
 /// The distribution of a count over pixels.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Distribution {
     /// Mean.
     pub mean: f64,
@@ -55,7 +55,7 @@ pub struct Distribution {
 }
 
 /// The alphas of a trace.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AlphaStatistics {
     /// Smallest, over fragments.
     pub min: f32,
@@ -72,7 +72,7 @@ pub struct AlphaStatistics {
 }
 
 /// The objects of a trace.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Objects {
     /// How many; a lower bound where `more` is set.
     pub count: usize,

@@ -1,0 +1,443 @@
+//! The study file: what to measure, as TOML.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use crate::capture::{CameraOptions, CaptureOptions, Faces, Order, PatternKind};
+use crate::design::{Configured, configure};
+use crate::error::{Error, Result};
+use crate::study::engine::EngineName;
+use crate::trace::{MAX_SIDE, SamplePattern};
+
+crate::options! {
+    /// A metric beyond the errors, which are always taken.
+    pub enum Metric {
+        Flip = "flip": "FLIP of the pictures on a display of standard range",
+        FlipHdr = "flip-hdr": "FLIP over all exposures in which something shows",
+        Spectrum = "spectrum": "the error's radially averaged power spectrum",
+        Filtered = "filtered": "RMSE after a Gaussian of 1 and of 2 pixels",
+    }
+}
+
+crate::options! {
+    /// Publications whose figures are measured again.
+    pub enum Publication {
+        LaineKarras = "lk": "Laine and Karras: table 1, figures 1, 3, 5, 6",
+        Methods = "methods": "Enderton's examples, Wyman's probabilities, hashes, LK figure 8",
+        Comparison = "comparison": "all designs at equal state, and Wyman's claim",
+    }
+}
+
+/// A study: every design at every sample count on every scene.
+///
+/// Read from TOML; unknown keys are errors. Written beside the results with every default
+/// filled in.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Study {
+    /// What it is called.
+    pub name: String,
+    /// What it is for, in a sentence or two.
+    #[serde(default)]
+    pub description: String,
+    /// Designs as `NAME` or `NAME:parameter=value,…`; `{n}` stands for the sample count
+    /// and `{2n}` for twice of it.
+    pub designs: Vec<String>,
+    /// Samples per pixel: of 1, 2, 4, 8, 16, 32 and 64.
+    pub samples: Vec<u32>,
+    /// How many seeds, for designs that have any. More make intervals narrower.
+    #[serde(default = "defaults::seeds")]
+    pub seeds: u32,
+    /// The first of them.
+    #[serde(default)]
+    pub first_seed: u32,
+    /// Engines: the first draws what errors are taken of, all are timed.
+    #[serde(default = "defaults::engines")]
+    pub engines: Vec<EngineName>,
+    /// Timed replays with each engine, after one that is not timed; 0 times nothing.
+    #[serde(default = "defaults::timing")]
+    pub timing: u32,
+    /// Metrics beyond the errors.
+    #[serde(default = "defaults::metrics")]
+    pub metrics: Vec<Metric>,
+    /// The design that others are held against; the first of `designs` where not given.
+    #[serde(default)]
+    pub baseline: String,
+    /// Publications whose figures are measured again, with built-in scenes.
+    #[serde(default)]
+    pub publications: Vec<Publication>,
+    /// Samples per pixel of the pictures that are kept for the report's viewer; none for
+    /// an empty list.
+    #[serde(default = "defaults::pictures")]
+    pub pictures: Vec<u32>,
+    /// MiB that a design may take whose state grows with the fragments.
+    #[serde(default = "defaults::memory")]
+    pub memory: u64,
+    /// The scenes.
+    #[serde(rename = "scene")]
+    pub scenes: Vec<SceneEntry>,
+}
+
+/// A scene of a study: drawn for it, or a trace that is there already.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneEntry {
+    /// A short name; the files' too.
+    pub name: String,
+    /// What is drawn: `builtin:NAME[:parameter=value,…]`, or a file, seen from the study
+    /// file's folder.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source: Option<String>,
+    /// In its place, a trace.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub trace: Option<String>,
+    /// Frame width and height in pixels.
+    #[serde(default = "defaults::size")]
+    pub size: [u32; 2],
+    /// Opacity in place of the materials' own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub alpha: Option<f32>,
+    /// A PNG or JPEG for surfaces that have no texture.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub texture: Option<String>,
+    /// Makes every surface white.
+    #[serde(default)]
+    pub white: bool,
+    /// The order in which triangles are drawn.
+    #[serde(default = "defaults::order")]
+    pub order: Order,
+    /// Which shuffle a random order takes.
+    #[serde(default)]
+    pub order_seed: u32,
+    /// Which sides of surfaces are drawn.
+    #[serde(default = "defaults::faces")]
+    pub faces: Faces,
+    /// Where the samples lie.
+    #[serde(default = "defaults::pattern")]
+    pub pattern: PatternKind,
+    /// Samples per pixel that are recorded; the study's counts are its first ones.
+    #[serde(default = "defaults::captured")]
+    pub captured_samples: u32,
+    /// Camera: degrees to the right of the scene's front, degrees above.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub angle: Option<[f64; 2]>,
+    /// Camera: distance in radii of the scene.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub distance: Option<f64>,
+    /// Camera: vertical field of view in degrees; 0 for parallel lines.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fov: Option<f64>,
+    /// Linear colour behind the scene.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub background: Option<[f32; 3]>,
+    /// The pixel that the report's inspector opens at; one with a handful of fragments
+    /// where not given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pixel: Option<[u16; 2]>,
+}
+
+/// What a study file need not say.
+mod defaults {
+    use super::{EngineName, Faces, Metric, Order, PatternKind};
+    use crate::param::Options;
+    use crate::rop::Which;
+
+    pub fn seeds() -> u32 {
+        8
+    }
+    pub fn engines() -> Vec<EngineName> {
+        vec![EngineName::Cpu(Which::Fast)]
+    }
+    pub fn timing() -> u32 {
+        3
+    }
+    pub fn metrics() -> Vec<Metric> {
+        Metric::ALL.to_vec()
+    }
+    pub fn pictures() -> Vec<u32> {
+        vec![8]
+    }
+    pub fn memory() -> u64 {
+        512
+    }
+    pub fn size() -> [u32; 2] {
+        [512, 512]
+    }
+    pub fn order() -> Order {
+        Order::Api
+    }
+    pub fn faces() -> Faces {
+        Faces::Material
+    }
+    pub fn pattern() -> PatternKind {
+        PatternKind::Auto
+    }
+    pub fn captured() -> u32 {
+        64
+    }
+}
+
+impl Study {
+    /// Reads the study in `text`; `place` names it in errors.
+    ///
+    /// # Errors
+    /// [`Error::Config`] where it is no study: where, what, and what would be right; for
+    /// an unknown key or name the nearest one.
+    pub fn parse(text: &str, place: &str) -> Result<Self> {
+        let mut study: Study = toml::from_str(text).map_err(|e| explained(&e, text, place))?;
+        if study.baseline.is_empty() {
+            study.baseline = study.designs.first().cloned().unwrap_or_default();
+        }
+        study.check().map_err(|e| Error::config(format_args!("{place}: {e}"), "correct it"))?;
+        Ok(study)
+    }
+
+    /// Reads the study at `path`.
+    ///
+    /// # Errors
+    /// [`Error::Io`] where it cannot be read or has more than 1 MiB, and as [`Study::parse`].
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = read_text(path)?;
+        Study::parse(&text, &path.display().to_string())
+    }
+
+    /// The study as TOML, every default filled in.
+    pub fn to_toml(&self) -> String {
+        toml::to_string(self).expect("a study's fields are values that TOML has")
+    }
+
+    /// The design of a series at a sample count.
+    ///
+    /// # Errors
+    /// As [`configure`].
+    pub fn design(&self, series: &str, samples: u32) -> Result<Configured> {
+        let spec =
+            series.replace("{n}", &samples.to_string()).replace("{2n}", &(2 * samples).to_string());
+        configure(&spec, &[])
+    }
+
+    /// Whether a metric is asked for.
+    pub fn takes(&self, metric: Metric) -> bool {
+        self.metrics.contains(&metric)
+    }
+
+    fn check(&self) -> Result<()> {
+        let lists = [
+            ("designs", self.designs.len()),
+            ("samples", self.samples.len()),
+            ("scene", self.scenes.len()),
+            ("engines", self.engines.len()),
+        ];
+        if let Some((name, _)) = lists.iter().find(|(_, len)| *len == 0) {
+            return Err(Error::config(format_args!("'{name}' is empty"), "name at least one"));
+        }
+        unique("design", &self.designs)?;
+        unique("sample count", &self.samples)?;
+        unique("scene", &self.scenes.iter().map(|s| &s.name).collect::<Vec<_>>())?;
+        unique("engine", &self.engines.iter().map(|e| e.name()).collect::<Vec<_>>())?;
+        if !(1..=100_000).contains(&self.seeds) {
+            return Err(out_of_range("seeds", self.seeds, "1 to 100000"));
+        }
+        if self.timing > 10_000 {
+            return Err(out_of_range("timing", self.timing, "0 to 10000"));
+        }
+        if !(1..=1 << 20).contains(&self.memory) {
+            return Err(out_of_range("memory", self.memory, "1 to 1048576 MiB"));
+        }
+        if self.first_seed.checked_add(self.seeds).is_none() {
+            let hint = "seeds end at 4294967295";
+            return Err(out_of_range("first_seed", self.first_seed, hint));
+        }
+        for count in self.samples.iter().chain(&self.pictures) {
+            if !SamplePattern::is_count(*count) {
+                return Err(out_of_range("samples", count, "1, 2, 4, 8, 16, 32 or 64"));
+            }
+        }
+        if let Some(count) = self.pictures.iter().find(|c| !self.samples.contains(c)) {
+            let what = format_args!("pictures are kept of {count} samples, which are not measured");
+            return Err(Error::config(what, "add the count to 'samples', or change 'pictures'"));
+        }
+        if !self.designs.contains(&self.baseline) {
+            let designs = self.designs.iter().map(String::as_str);
+            return Err(Error::unknown("design as a baseline:", &self.baseline, designs));
+        }
+        for series in &self.designs {
+            self.samples.iter().try_for_each(|s| self.design(series, *s).map(|_| ()))?;
+        }
+        self.scenes.iter().try_for_each(|scene| scene.check(&self.samples))
+    }
+}
+
+impl SceneEntry {
+    /// How it is captured.
+    pub fn options(&self) -> CaptureOptions {
+        CaptureOptions {
+            width: self.size[0],
+            height: self.size[1],
+            samples: self.captured_samples,
+            pattern: self.pattern,
+            alpha: self.alpha,
+            order: self.order,
+            order_seed: self.order_seed,
+            faces: self.faces,
+            background: self.background,
+            camera: CameraOptions {
+                angle: self.angle,
+                distance: self.distance,
+                field_of_view: self.fov,
+            },
+            ..CaptureOptions::default()
+        }
+    }
+
+    fn check(&self, samples: &[u32]) -> Result<()> {
+        let name = &self.name;
+        let plain = |c: char| c.is_ascii_alphanumeric() || "-_.".contains(c);
+        if name.is_empty() || name.len() > 64 || name.starts_with('.') || !name.chars().all(plain) {
+            return Err(Error::config(
+                format_args!("'{name}' is no name for a scene, since files are called so"),
+                "take up to 64 letters, digits, '-', '_' and '.'",
+            ));
+        }
+        if self.source.is_some() == self.trace.is_some() {
+            return Err(Error::config(
+                format_args!("scene '{name}' needs either a source or a trace"),
+                "give one of the two",
+            ));
+        }
+        if self.size.iter().any(|side| !(1..=MAX_SIDE).contains(side)) {
+            let [w, h] = self.size;
+            return Err(out_of_range("size", format_args!("{w}, {h}"), "1 to 65536 pixels a side"));
+        }
+        if !SamplePattern::is_count(self.captured_samples) {
+            let count = self.captured_samples;
+            return Err(out_of_range("captured_samples", count, "1, 2, 4, 8, 16, 32 or 64"));
+        }
+        if let Some(count) = samples.iter().find(|s| **s > self.captured_samples) {
+            return Err(Error::config(
+                format_args!("scene '{name}' is captured with fewer than {count} samples"),
+                "raise captured_samples",
+            ));
+        }
+        Ok(())
+    }
+}
+
+fn out_of_range(key: &str, value: impl std::fmt::Display, range: &str) -> Error {
+    Error::config(format_args!("'{key}' cannot be {value}"), format_args!("it is {range}"))
+}
+
+fn unique<T: Ord + std::fmt::Display>(kind: &str, list: &[T]) -> Result<()> {
+    let mut seen = BTreeSet::new();
+    match list.iter().find(|v| !seen.insert(*v)) {
+        None => Ok(()),
+        Some(twice) => {
+            Err(Error::config(format_args!("{kind} '{twice}' is named twice"), "name it once"))
+        }
+    }
+}
+
+/// Texts longer than this are no study files.
+const MOST_BYTES: u64 = 1 << 20;
+
+pub(super) fn read_text(path: &Path) -> Result<String> {
+    use std::io::Read;
+    let file = std::fs::File::open(path).map_err(|e| Error::io("read", path, e))?;
+    let mut text = String::new();
+    let read = file.take(MOST_BYTES + 1).read_to_string(&mut text);
+    read.map_err(|e| Error::io("read", path, e))?;
+    if text.len() as u64 > MOST_BYTES {
+        let what = "it is longer than 1 MiB";
+        return Err(Error::invalid(path.display(), what, "give a study file"));
+    }
+    Ok(text)
+}
+
+/// What is wrong with a study file, and where; of an unknown name, which is the nearest.
+fn explained(error: &toml::de::Error, text: &str, place: &str) -> Error {
+    let place = match error.span() {
+        Some(span) => {
+            let before = text.get(..span.start).unwrap_or("");
+            format!("{place}, line {}", before.matches('\n').count() + 1)
+        }
+        None => place.to_string(),
+    };
+    // serde: unknown field `a`, expected one of `b`, `c`.
+    let message = error.message().replace('\n', " ");
+    let mut names = message.split('`').skip(1).step_by(2);
+    for (start, kind) in [("unknown field", "key"), ("unknown variant", "name")] {
+        if let (true, Some(name)) = (message.starts_with(start), names.next()) {
+            return Error::unknown(&format!("{kind} in {place}:"), name, names);
+        }
+    }
+    Error::config(format_args!("{place}: {message}"), "correct it")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SMALL: &str = "name = 'a'\ndesigns = ['lk', 'kbuffer:layers={n}']\nsamples = [4, 8]\n\
+        [[scene]]\nname = 'engine'\nsource = 'builtin:engine'\n";
+
+    fn message(from: &str, to: &str) -> String {
+        let text = SMALL.replace(from, to);
+        assert_ne!(text, SMALL);
+        Study::parse(&text, "a.toml").unwrap_err().to_string()
+    }
+
+    #[test]
+    fn what_is_left_out_has_its_default_and_is_written() {
+        let study = Study::parse(SMALL, "a.toml").unwrap();
+        assert_eq!((study.seeds, study.baseline.as_str()), (8, "lk"));
+        assert_eq!(study.design("kbuffer:layers={n}", 8).unwrap().values().integer("layers"), 8);
+        let text = study.to_toml();
+        assert!(text.contains("seeds = 8"), "{text}");
+        assert_eq!(Study::parse(&text, "b.toml").unwrap(), study);
+    }
+
+    #[test]
+    fn a_wrong_key_or_name_says_where_and_the_nearest() {
+        assert_eq!(
+            message("samples =", "sampels ="),
+            "unknown key in a.toml, line 3: 'sampels'; did you mean 'samples'?"
+        );
+        assert_eq!(
+            message("source =", "sorce ="),
+            "unknown key in a.toml, line 6: 'sorce'; did you mean 'source'?"
+        );
+        assert_eq!(
+            message("name = 'a'", "name = 'a'\nmetrics = ['flop']"),
+            "unknown name in a.toml, line 2: 'flop'; did you mean 'flip'?"
+        );
+        assert_eq!(
+            message("name = 'a'", "name = 'a'\nengines = ['gpo']"),
+            "unknown name in a.toml, line 2: 'gpo'; did you mean 'gpu'?"
+        );
+        let wrong = message("'lk'", "'kl'");
+        assert!(wrong.contains("unknown design 'kl'; did you mean 'lk'?"), "{wrong}");
+        let wrong = message("layers={n}", "layer={n}");
+        assert!(wrong.contains("did you mean 'layers'?"), "{wrong}");
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused() {
+        for (from, to, says) in [
+            ("[4, 8]", "[4, 5]", "'samples' cannot be 5"),
+            ("[4, 8]", "[4, 4]", "'4' is named twice"),
+            ("[4, 8]", "[4]", "pictures are kept of 8 samples"),
+            ("[4, 8]", "[]", "'samples' is empty"),
+            ("'engine'", "'a/b'", "is no name for a scene"),
+            ("'engine'", "'..'", "is no name for a scene"),
+            ("source = 'builtin:engine'", "", "needs either a source or a trace"),
+            ("name = 'a'", "name = 'a'\nseeds = 0", "'seeds' cannot be 0"),
+            ("name = 'a'", "name = 'a'\nbaseline = 'slab'", "unknown design as a baseline"),
+            ("name = 'a'", "name = 'a", "line 1"),
+        ] {
+            let wrong = message(from, to);
+            assert!(wrong.contains(says), "{wrong}");
+        }
+    }
+}
