@@ -91,7 +91,7 @@ impl Contrast {
             kernels: SENSITIVITY.map(|terms| kernels(terms, pixels_per_degree)),
             to_rgb: rows(matrix.inverse()),
             to_xyz,
-            largest: libm::powf(hyab(green, blue), COLOUR_EXPONENT),
+            largest: power(hyab(green, blue), COLOUR_EXPONENT),
         }
     }
 
@@ -120,7 +120,7 @@ impl Contrast {
         if distance == 0.0 {
             return 0.0;
         }
-        let share = libm::powf(distance, COLOUR_EXPONENT) / self.largest;
+        let share = power(distance, COLOUR_EXPONENT) / self.largest;
         if share < KNEE {
             share * (KNEE_VALUE / KNEE)
         } else {
@@ -162,6 +162,13 @@ fn hunt_lab(xyz: [f32; 3]) -> [f32; 3] {
     });
     let lightness = 116.0 * y - 16.0;
     [lightness, 0.01 * lightness * 500.0 * (x - y), 0.01 * lightness * 200.0 * (y - z)]
+}
+
+/// A positive number to a power, to some 1e-6 of itself: half the time of the exact one,
+/// in which most of a map's time would go.
+#[inline]
+pub(super) fn power(base: f32, exponent: f32) -> f32 {
+    libm::exp2f(exponent * libm::log2f(base))
 }
 
 /// The distance HyAB (Abasi, Tehran and Fairchild 2019): of lightness and, apart from it,

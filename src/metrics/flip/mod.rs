@@ -152,7 +152,7 @@ impl Flip {
             }
             let edge = (a.edge[i] - b.edge[i]).abs();
             let point = (a.point[i] - b.point[i]).abs();
-            libm::powf(colour, 1.0 - features::difference(edge, point))
+            colour::power(colour, 1.0 - features::difference(edge, point))
         };
         (0..self.size.pixels()).map(pixel).collect()
     }
