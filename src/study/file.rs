@@ -367,10 +367,11 @@ fn explained(error: &toml::de::Error, text: &str, place: &str) -> Error {
     // serde: unknown field `a`, expected one of `b`, `c`.
     let message = error.message().replace('\n', " ");
     let mut names = message.split('`').skip(1).step_by(2);
-    for (start, kind) in [("unknown field", "key"), ("unknown variant", "name")] {
-        if let (true, Some(name)) = (message.starts_with(start), names.next()) {
-            return Error::unknown(&format!("{kind} in {place}:"), name, names);
-        }
+    let kind = [("unknown field", "key"), ("unknown variant", "name")]
+        .into_iter()
+        .find_map(|(start, kind)| message.starts_with(start).then_some(kind));
+    if let (Some(kind), Some(name)) = (kind, names.next()) {
+        return Error::unknown(&format!("{kind} in {place}:"), name, names);
     }
     Error::config(format_args!("{place}: {message}"), "correct it")
 }
@@ -416,8 +417,8 @@ mod tests {
             message("name = 'a'", "name = 'a'\nengines = ['gpo']"),
             "unknown name in a.toml, line 2: 'gpo'; did you mean 'gpu'?"
         );
-        let wrong = message("'lk'", "'kl'");
-        assert!(wrong.contains("unknown design 'kl'; did you mean 'lk'?"), "{wrong}");
+        let wrong = message("'lk'", "'endertn'");
+        assert!(wrong.contains("unknown design 'endertn'; did you mean 'enderton'?"), "{wrong}");
         let wrong = message("layers={n}", "layer={n}");
         assert!(wrong.contains("did you mean 'layers'?"), "{wrong}");
     }
