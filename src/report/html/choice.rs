@@ -1,0 +1,389 @@
+//! The summary: which design to build, and error against cost.
+
+use maud::{Markup, html};
+
+use crate::param::Options;
+use crate::report::chart::{Axis, Curve, Kind, Mark, Plot};
+use crate::report::html::parts::{Cell, Content, figure, nothing, tabs};
+use crate::report::html::words::{counted, estimated, figures, fixed, listed};
+use crate::study::analysis::{
+    Answer, BUDGETS, Budget, Candidate, Cost, Need, Point, Points, Separation, answers, baseline,
+    points, relative,
+};
+
+pub(super) fn section(content: &Content<'_>) -> Markup {
+    let answers = answers(content.results);
+    let on = baseline(&content.results.study);
+    html! {
+        div class="answer" { @for sentence in lead(content, &answers) { p { (sentence) } } }
+        h3 { "The least error for a need and a budget" }
+        (figure("answers", &table(&answers), &html! {
+            "In each cell the design with the least error over all scenes, its samples per pixel, \
+             its error as a share of that of " code { (on.series) } " at " (on.samples)
+            " samples with a 95 % interval, its state and passes, and below it the best other \
+             design. " b { "=" } " no difference that these seeds show; " b { ">" }
+            " their intervals separate them; " b { "?" } " one seed tells nothing."
+        }, &content.study_command()))
+        h3 { "Error against cost, all scenes" }
+        (central(content))
+        details {
+            summary { "Error against cost, scene by scene" }
+            (per_scene(content))
+        }
+    }
+}
+
+fn bytes(c: &Candidate<'_>) -> String {
+    match c.state {
+        Some(bytes) => format!("{} bytes per pixel", figures_of_bytes(bytes)),
+        None => "state that grows with the fragments".to_string(),
+    }
+}
+
+fn figures_of_bytes(bytes: f64) -> String {
+    if bytes.fract() == 0.0 { fixed(bytes, 0) } else { fixed(bytes, 1) }
+}
+
+fn passes(c: &Candidate<'_>) -> String {
+    if c.passes == 1 { "one pass".into() } else { format!("{} passes", c.passes) }
+}
+
+/// What the answers say, in sentences. Every word follows from the numbers.
+pub(super) fn lead(content: &Content<'_>, answers: &[Answer<'_>]) -> Vec<String> {
+    let find = |need: Need, budget: Budget| {
+        answers.iter().find(|a| a.need == need && a.budget == budget)
+    };
+    let on = baseline(&content.results.study);
+    let mut text = Vec::new();
+    let scenes = content.results.study.scenes.len();
+    let over = if scenes == 1 { "on the one scene".to_string() } else { format!("over {scenes} scenes") };
+    let cases = [
+        (Need::Any, Budget::Bounded, "With a fixed state per pixel"),
+        (Need::All, Budget::Bounded, "Of those that are unbiased, take fragments in any order and need one pass"),
+        (Need::All, Budget::Bytes(64), "Of the same within 64 bytes per pixel"),
+    ];
+    let mut before: Option<(&str, u32)> = None;
+    for (need, budget, start) in cases {
+        let Some(answer) = find(need, budget) else { continue };
+        let Some(best) = &answer.best else {
+            text.push(format!("{start}, none has results on all scenes."));
+            before = None;
+            continue;
+        };
+        let run = (best.run.series, best.run.samples);
+        if before == Some(run) {
+            text.push(format!("{start}, it is the same."));
+            continue;
+        }
+        before = Some(run);
+        let first = text.is_empty();
+        let share = if run == (on.series, on.samples) {
+            "it is the baseline itself".to_string()
+        } else {
+            let of = if first {
+                format!(" times that of {} at {} samples", on.series, on.samples)
+            } else {
+                String::new()
+            };
+            format!("{}{of}", estimated(best.error))
+        };
+        let over = if first { format!(" {over}") } else { String::new() };
+        text.push(format!(
+            "{start}, {} at {} has the least error{over}: {share}, with {} in {}. {}",
+            best.design,
+            counted(best.run.samples as usize, "sample"),
+            bytes(best),
+            passes(best),
+            second(answer)
+        ));
+    }
+    text.extend(left_out(content));
+    text
+}
+
+/// What is said of the runner-up.
+fn second(answer: &Answer<'_>) -> String {
+    let Some(second) = &answer.runner_up else {
+        return "No other design meets this.".to_string();
+    };
+    let name =
+        format!("{} at {}", second.design, counted(second.run.samples as usize, "sample"));
+    match answer.separation {
+        Separation::Alone => String::new(),
+        Separation::Apart(share) => format!(
+            "Next is {name} with {}, and the intervals separate the two: the first has {} times \
+             its error.",
+            figures(second.error.value),
+            estimated(share)
+        ),
+        Separation::NoDifference(_) => {
+            format!("Between it and {name} there is no difference that these seeds show.")
+        }
+        Separation::OneSeed => {
+            format!("Next is {name} with {}; one seed cannot tell them apart.", figures(second.error.value))
+        }
+    }
+}
+
+/// Which designs cannot be chosen at any sample count, since results are missing.
+fn left_out(content: &Content<'_>) -> Option<String> {
+    let study = &content.results.study;
+    let known = |series: &String| {
+        let has = |samples: &u32| {
+            let run = crate::study::analysis::RunName { series, samples: *samples };
+            relative(content.results, run).is_ok()
+        };
+        study.samples.iter().any(has)
+    };
+    let gone: Vec<String> = study.designs.iter().filter(|s| !known(s)).cloned().collect();
+    (!gone.is_empty()).then(|| {
+        format!("Left out, since results are missing on some scene: {}.", listed(&gone))
+    })
+}
+
+fn table(answers: &[Answer<'_>]) -> Markup {
+    html! {
+        div class="scroll" tabindex="0" role="region" aria-label="Table" {
+            table class="answers" {
+                thead { tr {
+                    th scope="col" { "state per pixel" }
+                    @for choice in Need::CHOICES { th scope="col" title=(choice.help) { (choice.name) } }
+                } }
+                tbody { @for budget in BUDGETS {
+                    tr {
+                        th scope="row" { (match budget {
+                            Budget::Bytes(most) => format!("≤ {most} bytes"),
+                            Budget::Bounded => "any fixed size".into(),
+                            Budget::Any => "may grow".into(),
+                        }) }
+                        @for answer in answers.iter().filter(|a| a.budget == budget) { (cell(answer)) }
+                    }
+                } }
+            }
+        }
+    }
+}
+
+fn cell(answer: &Answer<'_>) -> Markup {
+    let Some(best) = &answer.best else { return html! { td class="none" { "none" } } };
+    let (sign, word) = match answer.separation {
+        Separation::Alone => ("", ""),
+        Separation::Apart(_) => (">", "the intervals separate them"),
+        Separation::NoDifference(_) => ("=", "no difference that these seeds show"),
+        Separation::OneSeed => ("?", "one seed gives no interval"),
+    };
+    html! {
+        td data-v=(best.error.value) data-low=(best.error.low) data-high=(best.error.high)
+            data-series=(best.run.series) data-samples=(best.run.samples) {
+            span class="pick" { code { (best.run.series) } " " span class="at" { (best.run.samples) } }
+            span class="value" {
+                b { (fixed(best.error.value, 3)) }
+                @if best.error.low != best.error.high {
+                    " " span class="pm" { (fixed(best.error.low, 3)) "–" (fixed(best.error.high, 3)) }
+                }
+            }
+            span class="small" {
+                @match best.state {
+                    Some(bytes) => { (figures_of_bytes(bytes)) " B" },
+                    None => { "grows" },
+                }
+                ", " (passes(best))
+            }
+            @if let Some(second) = &answer.runner_up {
+                span class="small second" title=(word) {
+                    b { (sign) } " " code { (second.run.series) } " " (second.run.samples) ", "
+                    (fixed(second.error.value, 3))
+                }
+            }
+        }
+    }
+}
+
+fn central(content: &Content<'_>) -> Markup {
+    let on = baseline(&content.results.study);
+    let panels: Vec<(String, Markup)> = Cost::ALL
+        .iter()
+        .zip(Cost::CHOICES)
+        .map(|(cost, choice)| (choice.name.to_string(), panel(content, *cost)))
+        .collect();
+    let panels: Vec<_> =
+        panels.iter().zip(Cost::CHOICES).map(|((_, p), c)| (c.help.to_string(), p.clone())).collect();
+    html! {
+        div class="central" {
+            fieldset class="filters" {
+                legend { "Show only designs that are" }
+                label { input type="checkbox" data-filter="unbiased"; " unbiased" }
+                label { input type="checkbox" data-filter="any-order"; " independent of order" }
+                label { input type="checkbox" data-filter="one-pass"; " done in one pass" }
+            }
+            (figure("central", &html! { (tabs("Cost", &panels)) (content.legend(|_| true)) }, &html! {
+                "Error over all scenes: the geometric mean of each scene's RMSE over covered pixels as a \
+                 share of that of " code { (on.series) } " at " (on.samples) " samples. Bars are 95 % \
+                 intervals, of both sides of the share; lines join the sample counts of a design. The \
+                 step line is the Pareto front: nothing shown has less of one and no more of the other. \
+                 Each picture is held against the exact one of the same samples."
+            }, &html! { (content.study_command()) (content.replay_one()) }))
+        }
+    }
+}
+
+/// The chart of one cost over all scenes, and who is not on it.
+fn panel(content: &Content<'_>, cost: Cost) -> Markup {
+    let all = points(content.results, None, cost);
+    let y = Axis { title: "error relative to the baseline".into(), kind: Kind::Log };
+    let plot = Plot {
+        title: format!("Error over all scenes against {}", cost.unit()),
+        size: [720.0, 470.0],
+        named_at: Some(content.count),
+        line: Some(1.0),
+        ..plot(content, &all, cost, y)
+    };
+    let shown: Option<Markup> = plot.draw();
+    html! {
+        p class="meaning" { (capital(cost.meaning())) "." }
+        @match shown {
+            Some(svg) => (svg),
+            None => (nothing("No design has both this cost and an error on all scenes.")),
+        }
+        (absent(&all))
+    }
+}
+
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |c| c.to_uppercase().chain(letters).collect())
+}
+
+fn plot(content: &Content<'_>, all: &Points<'_>, cost: Cost, y: Axis) -> Plot {
+    let x = Axis {
+        title: cost.unit().to_string(),
+        kind: if cost == Cost::State { Kind::Log2 } else { Kind::Log },
+    };
+    let curves = content
+        .designs()
+        .iter()
+        .filter_map(|series| {
+            let own: Vec<&Point<'_>> = all.known.iter().filter(|p| p.run.series == series).collect();
+            let first = own.first()?;
+            // A filter must not let through a design that needs more passes at more samples.
+            let passes = own.iter().map(|p| p.passes).max().unwrap_or(0);
+            Some(Curve {
+                series: series.clone(),
+                style: content.styles.of(series),
+                facts: Some((first.promises, passes)),
+                marks: own.iter().map(|p| mark(p, cost)).collect(),
+            })
+        })
+        .collect();
+    let title = String::new();
+    Plot { title, x, y, size: [360.0, 290.0], curves, front: true, named_at: None, line: None }
+}
+
+fn mark(p: &Point<'_>, cost: Cost) -> Mark {
+    let unit = if p.id.is_some() { " of 255 RMSE" } else { " times the baseline's error" };
+    let spread = if p.cost.low == p.cost.high {
+        String::new()
+    } else {
+        format!(" ({} to {})", figures(p.cost.low), figures(p.cost.high))
+    };
+    let says = format!(
+        "{} at {}\n{}{unit}\n{}{spread} {}{}",
+        p.run.series,
+        counted(p.run.samples as usize, "sample"),
+        estimated(p.error),
+        figures(p.cost.median),
+        cost.unit(),
+        if p.front { "\non the Pareto front" } else { "" }
+    );
+    Mark {
+        id: p.id.map(str::to_string),
+        samples: Some(p.run.samples),
+        cost: p.cost,
+        error: p.error,
+        says,
+        front: p.front,
+        marked: true,
+    }
+}
+
+/// Who is not on a chart, reason by reason.
+fn absent(all: &Points<'_>) -> Markup {
+    let mut reasons: Vec<(&str, Vec<(&str, Vec<String>)>)> = Vec::new();
+    for (run, why) in &all.absent {
+        let reason = match reasons.iter().position(|(w, _)| w == why) {
+            Some(place) => place,
+            None => {
+                reasons.push((why, Vec::new()));
+                reasons.len() - 1
+            }
+        };
+        let list = &mut reasons[reason].1;
+        match list.iter_mut().find(|(series, _)| *series == run.series) {
+            Some((_, counts)) => counts.push(run.samples.to_string()),
+            None => list.push((run.series, vec![run.samples.to_string()])),
+        }
+    }
+    html! {
+        @if !reasons.is_empty() {
+            p class="absent" {
+                b { "Not shown. " }
+                @for (why, list) in &reasons {
+                    span class="reason" { (capital(why)) ": " }
+                    @for (i, (series, counts)) in list.iter().enumerate() {
+                        @if i > 0 { ", " }
+                        code { (series) } " at " (listed(counts))
+                    }
+                    ". "
+                }
+            }
+        }
+    }
+}
+
+fn per_scene(content: &Content<'_>) -> Markup {
+    let panels: Vec<(String, Markup)> = Cost::ALL
+        .iter()
+        .zip(Cost::CHOICES)
+        .map(|(cost, choice)| (choice.help.to_string(), multiples(content, *cost)))
+        .collect();
+    figure(
+        "central-scenes",
+        &html! { (tabs("Cost", &panels)) (content.legend(|_| true)) },
+        &html! {
+            "RMSE over covered pixels in 8-bit units on linear values, with 95 % intervals over seeds."
+        },
+        &html! { (content.study_command()) (content.replay_one()) },
+    )
+}
+
+fn multiples(content: &Content<'_>, cost: Cost) -> Markup {
+    html! {
+        div class="multiples" {
+            @for scene in content.scenes() {
+                div class="small-chart" {
+                    h4 { (scene) }
+                    @let all = points(content.results, Some(scene), cost);
+                    @let y = Axis { title: "RMSE, 8-bit units".into(), kind: Kind::Log };
+                    @let plot = Plot {
+                        title: format!("RMSE on {scene} against {}", cost.unit()),
+                        ..plot(content, &all, cost, y)
+                    };
+                    @match plot.draw() {
+                        Some(svg) => (svg),
+                        None => (nothing("No design has both this cost and an error here.")),
+                    }
+                    (absent(&all))
+                }
+            }
+        }
+    }
+}
+
+/// A share for a table, or the scenes that lack.
+pub(super) fn share_cell(content: &Content<'_>, series: &str, samples: u32) -> Cell {
+    let run = crate::study::analysis::RunName { series, samples };
+    match relative(content.results, run) {
+        Ok(e) => Cell::Estimate(e, 3),
+        Err(scenes) => Cell::Missing(format!("no result on {}", scenes.join(", "))),
+    }
+}
