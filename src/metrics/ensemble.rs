@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::metrics::{Errors, Estimate, Region, UNIT, errors};
+use crate::metrics::temporal::Deviations;
+use crate::metrics::{Errors, Estimate, Region, Temporal, UNIT, errors};
 use crate::picture::{Picture, TilePixels};
 use crate::tile::{TILE_PIXELS, TileMap};
 
@@ -42,6 +43,9 @@ pub struct EnsembleErrors {
     /// of its own: scatters around 0 for an unbiased design, so it can be
     /// negative. In squared units; `None` for a single seed.
     pub bias_squared: Option<f64>,
+    /// What a viewer of a pixel sees over frames of different seeds; `None` for a single
+    /// seed or an empty region.
+    pub temporal: Option<Temporal>,
 }
 
 impl<'a> Ensemble<'a> {
@@ -94,16 +98,15 @@ impl<'a> Ensemble<'a> {
         add(&mut self.rest.0, &mut self.rest.1, picture.background(), self.reference.background());
     }
 
-    /// Calls `each` with the mean error and the variance over the runs of every
-    /// channel of `region`, and with how many pixels have just these: 1, or all that
-    /// no run has touched.
-    fn for_each_channel(&self, region: &Region, mut each: impl FnMut(f64, f64, u64)) {
+    /// Calls `each` with the mean errors and the variances over the runs of the
+    /// channels of every pixel of `region`, and with how many pixels have just these: 1,
+    /// or all that no run has touched.
+    fn for_each_pixel(&self, region: &Region, mut each: impl FnMut([f64; 3], [f64; 3], u64)) {
         let n = self.runs.first().map_or(0, Vec::len) as f64;
         let mut pixel = |sum: &[f64; 3], square: &[f64; 3], times| {
-            for (s, q) in sum.iter().zip(square) {
-                let mean = s / n;
-                each(mean, ((q - s * mean) / (n - 1.0)).max(0.0), times);
-            }
+            let mean = sum.map(|s| s / n);
+            let variance = |i: usize| ((square[i] - sum[i] * mean[i]) / (n - 1.0)).max(0.0);
+            each(mean, std::array::from_fn(variance), times);
         };
         let mut visited = 0;
         for (tile, (sum, square)) in self.sums.touched() {
@@ -125,10 +128,12 @@ impl<'a> Ensemble<'a> {
     pub fn z_scores(&self, region: usize) -> Vec<f64> {
         let n = self.runs[region].len() as f64;
         let mut scores = Vec::new();
-        self.for_each_channel(self.regions[region], |mean, variance, _| {
-            // Rounding leaves crumbs where all runs are equal.
-            let exact = mean.abs() < 1e-6 && variance < 1e-12;
-            scores.push(if exact { 0.0 } else { mean / (variance / n).sqrt() });
+        self.for_each_pixel(self.regions[region], |means, variances, _| {
+            for (mean, variance) in means.into_iter().zip(variances) {
+                // Rounding leaves crumbs where all runs are equal.
+                let exact = mean.abs() < 1e-6 && variance < 1e-12;
+                scores.push(if exact { 0.0 } else { mean / (variance / n).sqrt() });
+            }
         });
         scores
     }
@@ -146,11 +151,15 @@ impl<'a> Ensemble<'a> {
         };
         let means: Vec<f64> = runs.iter().map(|r| r.mean).collect();
         let (mut variance, mut bias_squared) = (0.0, 0.0);
+        let mut deviations = Deviations::default();
         if runs.len() > 1 {
-            self.for_each_channel(region, |mean, v, pixels| {
-                variance += v * pixels as f64;
-                // E[mean²] = bias² + v/n.
-                bias_squared += (mean * mean - v / n) * pixels as f64;
+            self.for_each_pixel(region, |means, variances, pixels| {
+                for (mean, v) in means.into_iter().zip(variances) {
+                    variance += v * pixels as f64;
+                    // E[mean²] = bias² + v/n.
+                    bias_squared += (mean * mean - v / n) * pixels as f64;
+                }
+                deviations.add((variances.iter().sum::<f64>() / 3.0).sqrt() / UNIT, pixels);
             });
         }
         let scale = 1.0 / ((3 * region.pixels()).max(1) as f64 * UNIT * UNIT);
@@ -164,6 +173,7 @@ impl<'a> Ensemble<'a> {
             max: runs.iter().map(|r| r.max).fold(0.0, f64::max),
             variance: known(variance),
             bias_squared: known(bias_squared),
+            temporal: deviations.finish(),
         }
     }
 }
@@ -196,6 +206,14 @@ mod tests {
         assert!(e.mean.low > 0.0);
         let rmse = (variance + bias).sqrt() * 255.0;
         assert!((e.rmse.value / rmse - 1.0).abs() < 1e-2 && e.rmse.low < e.rmse.value);
+        // Records can be read back; serde_json may miss a number's last bit.
+        let json = serde_json::to_string(e).unwrap();
+        let back: EnsembleErrors = serde_json::from_str(&json).unwrap();
+        let near = |a: f64, b: f64| (a - b).abs() <= 1e-15 * b.abs();
+        assert_eq!((back.seeds, back.pixels), (e.seeds, e.pixels));
+        assert!(near(back.rmse.value, e.rmse.value) && near(back.max, e.max));
+        let p95 = |e: &EnsembleErrors| e.temporal.unwrap().deviation_p95;
+        assert!(near(p95(&back), p95(e)) && near(back.variance.unwrap(), e.variance.unwrap()));
     }
 
     #[test]
@@ -233,5 +251,10 @@ mod tests {
         let bias_squared = (25.0 / 9.0 - 4.0 / 9.0 + 1.0) / 2.0;
         assert!((e.bias_squared.unwrap() * UNIT * UNIT - bias_squared).abs() < 1e-12);
         assert_eq!(ensemble.z_scores(0).len(), 3 * (256 + 1));
+        // Half of the pixels flicker.
+        let t = e.temporal.unwrap();
+        let flicker = (4.0_f64 / 3.0).sqrt() * 255.0;
+        assert!(t.deviation_median == 0.0 && (t.deviation_p95 / flicker - 1.0).abs() < 1e-6);
+        assert!((t.deviation_max / flicker - 1.0).abs() < 1e-6);
     }
 }

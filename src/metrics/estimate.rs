@@ -1,18 +1,36 @@
 //! Means with their uncertainty.
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// A mean over independent runs and how well it is known.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Estimate {
     /// The mean.
+    #[serde(deserialize_with = "or_nan")]
     pub value: f64,
     /// Lower end of its 95 % confidence interval; the mean itself where there is
     /// only one run.
+    #[serde(deserialize_with = "or_lowest")]
     pub low: f64,
     /// Upper end.
+    #[serde(deserialize_with = "or_highest")]
     pub high: f64,
+}
+
+// JSON has no word for what is not finite and writes `null`. An interval's end that is
+// missing is infinitely far away; a value that is missing is not known.
+
+fn or_nan<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(from)?.unwrap_or(f64::NAN))
+}
+
+fn or_lowest<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(from)?.unwrap_or(f64::NEG_INFINITY))
+}
+
+fn or_highest<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(from)?.unwrap_or(f64::INFINITY))
 }
 
 /// Student's t for a two-sided interval of `confidence` over `runs` runs: its
@@ -84,6 +102,23 @@ mod tests {
         // 3 is 3 / √½ of its standard errors.
         assert!((e.standard_errors(5) - 3.0 * 2_f64.sqrt()).abs() < 1e-9);
         assert_eq!(Estimate::of(&[7.0]), Estimate { value: 7.0, low: 7.0, high: 7.0 });
+    }
+
+    #[test]
+    fn estimates_come_back_from_records() {
+        let back = |e: Estimate| -> Estimate {
+            serde_json::from_str(&serde_json::to_string(&e).unwrap()).unwrap()
+        };
+        let e = Estimate { value: 0.1, low: -1e-300, high: 2.0 };
+        assert_eq!(back(e), e);
+        let unknown = exact(2.0).ratio(exact(0.0));
+        assert!(back(unknown).value.is_nan());
+        assert_eq!((back(unknown).low, back(unknown).high), (0.0, f64::INFINITY));
+        assert!(serde_json::from_str::<Estimate>(r#"{"value": 1, "low": 0}"#).is_err());
+    }
+
+    fn exact(value: f64) -> Estimate {
+        Estimate { value, low: value, high: value }
     }
 
     #[test]

@@ -3,16 +3,32 @@
 //! Errors are in 8-bit units: 1 is 1/255 of the range from black to white. On
 //! linear values they are those of the light itself; on sRGB-encoded ones, those
 //! of the numbers that an 8-bit display would be sent.
+//!
+//! Beside them stand what a viewer would see of an error ([`Flip`]), how it is spread over
+//! spatial frequencies ([`Spectrum`]), what a filter leaves of it ([`filtered_rmse`]), how
+//! it changes from frame to frame ([`Temporal`]) and how it falls with the number of
+//! samples ([`Convergence`]).
 
+mod convergence;
 mod ensemble;
 mod estimate;
+mod filtered;
+mod flip;
+mod planes;
 mod region;
+mod spectrum;
+mod temporal;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
+pub use convergence::Convergence;
 pub use ensemble::{Ensemble, EnsembleErrors};
 pub use estimate::{Estimate, student_t};
+pub use filtered::filtered_rmse;
+pub use flip::{BRIGHTEST, Flip, FlipFigures, FlipMap, PIXELS_PER_DEGREE};
 pub use region::{PixelClasses, Region};
+pub use spectrum::Spectrum;
+pub use temporal::Temporal;
 
 use crate::picture::{Picture, srgb};
 use crate::tile::TILE_PIXELS;
@@ -21,7 +37,7 @@ use crate::tile::TILE_PIXELS;
 pub const UNIT: f64 = 1.0 / 255.0;
 
 /// The error of one picture over a region, in 8-bit units.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 pub struct Errors {
     /// How many pixels it is over.
     pub pixels: u64,

@@ -1,8 +1,11 @@
-//! The Python of `docs/TRACE_FORMAT.md` does what the document says.
+//! The Python of `docs/TRACE_FORMAT.md` does what the document says, and FLIP is what its
+//! authors' Python package makes of the same pictures.
 
 use std::path::Path;
 use std::process::Command;
 
+use screendoor::metrics::{Flip, FlipMap};
+use screendoor::picture::Picture;
 use screendoor::trace::{Trace, statistics};
 
 use crate::util::{design, header, picture, random_fragments, trace_bytes};
@@ -62,4 +65,56 @@ fn pyarrow_writes_and_reads_traces() {
     assert!(said.contains("test 500 fragments"), "{said}");
     let found: f64 = said.rsplit(' ').next().unwrap().trim().parse().unwrap();
     assert!((found - mean).abs() < 1e-9, "{said}");
+}
+
+/// Reads two pictures, writes the map of FLIP's own evaluator.
+const EVALUATOR: &str = r#"
+import numpy as np, flip_evaluator
+kind, width, height = open("kind").read().split()
+read = lambda name: np.fromfile(name, "<f4").reshape(int(height), int(width), 3)
+flip, mean, _ = flip_evaluator.evaluate(
+    read("reference"), read("picture"), kind, inputsRGB=False, applyMagma=False)
+np.asarray(flip, "<f4").tofile("map")
+print(mean)
+"#;
+
+fn hold_to_the_evaluator(kind: &str, reference: &Picture, picture: &Picture, map: &FlipMap) {
+    let folder = tempfile::tempdir().unwrap();
+    let place = |name: &str| folder.path().join(name);
+    for (name, picture) in [("reference", reference), ("picture", picture)] {
+        let pixel = |x, y| picture.get(x, y).map(|c| (c as f32).to_le_bytes()).concat();
+        let row = |y| (0..picture.width()).flat_map(move |x| pixel(x, y));
+        std::fs::write(place(name), (0..picture.height()).flat_map(row).collect::<Vec<u8>>())
+            .unwrap();
+    }
+    let size = format!("{kind} {} {}", map.width(), map.height());
+    std::fs::write(place("kind"), size).unwrap();
+    let mean: f64 = run(folder.path(), EVALUATOR).trim().parse().unwrap();
+    assert!((map.figures().mean - mean).abs() < 1e-5, "{kind}: {mean}, {:?}", map.figures());
+    let theirs = std::fs::read(place("map")).unwrap();
+    let theirs: Vec<f32> =
+        theirs.chunks(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect();
+    assert_eq!(theirs.len(), map.values().len());
+    let differences = map.values().iter().zip(&theirs).map(|(a, b)| (a - b).abs());
+    let most = differences.fold(0.0, f32::max);
+    println!("{kind}: mean {mean}, pixels differ by {most} at most");
+    // Rounding of small differences is magnified by their powers.
+    assert!(most < 1e-3, "{kind}: {most}");
+}
+
+#[test]
+#[ignore = "needs python3 with flip-evaluator (SCREENDOOR_PYTHON names another interpreter)"]
+fn flip_is_its_authors_evaluators() {
+    for name in ["glass", "hair", "foliage", "layers"] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("traces/{name}.arrow"));
+        let trace = Trace::open(&path).unwrap();
+        let reference = picture(&design("exact"), &trace, 8, 0);
+        let noisy = picture(&design("lk"), &trace, 8, 1);
+        let flip = Flip::new(&reference);
+        hold_to_the_evaluator("LDR", &reference, &noisy, &flip.ldr(&noisy));
+        // The same with highlights: from 0 up to some 30.
+        let brighten = |p: &Picture| p.zip(p, |a, _| a.map(|c| c + 30.0 * c.powi(4)));
+        let (reference, noisy) = (brighten(&reference), brighten(&noisy));
+        hold_to_the_evaluator("HDR", &reference, &noisy, &Flip::new(&reference).hdr(&noisy));
+    }
 }

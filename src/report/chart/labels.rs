@@ -64,11 +64,32 @@ fn spots([x, y]: [f64; 2], width: f64) -> Vec<(Placed, Area)> {
             (x - diagonal - width, y - diagonal),
             (x - diagonal - width, y + diagonal),
         ] {
-            let area = [from - 1.0, middle - HEIGHT / 2.0, from + width + 1.0, middle + HEIGHT / 2.0];
+            let area =
+                [from - 1.0, middle - HEIGHT / 2.0, from + width + 1.0, middle + HEIGHT / 2.0];
             list.push((Placed { x: from, y: middle + 4.0, leader }, area));
         }
     }
     list
+}
+
+/// Heights for names in a column beside marks of these heights, in their order, none
+/// nearer to another than a line.
+pub(super) fn column(heights: &[f64], top: f64, bottom: f64) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..heights.len()).collect();
+    order.sort_by(|a, b| heights[*a].total_cmp(&heights[*b]));
+    let mut placed = heights.to_vec();
+    let mut free = top;
+    for i in &order {
+        placed[*i] = placed[*i].max(free);
+        free = placed[*i] + HEIGHT;
+    }
+    // What was pushed below the frame pushes back.
+    let mut most = bottom;
+    for i in order.iter().rev() {
+        placed[*i] = placed[*i].min(most);
+        most = placed[*i] - HEIGHT;
+    }
+    placed
 }
 
 fn overlap(a: &Area, b: &Area) -> bool {
@@ -78,6 +99,16 @@ fn overlap(a: &Area, b: &Area) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_column_keeps_its_order_and_distances() {
+        let placed = column(&[50.0, 52.0, 10.0, 51.0, 198.0, 199.0], 0.0, 200.0);
+        let mut sorted = placed.clone();
+        sorted.sort_by(f64::total_cmp);
+        assert!(sorted.windows(2).all(|w| w[1] - w[0] > HEIGHT - 1e-9), "{placed:?}");
+        assert!(placed[2] < placed[0] && placed[0] < placed[3] && placed[3] < placed[1]);
+        assert!(sorted[0] >= 0.0 && sorted[5] <= 200.0);
+    }
 
     #[test]
     fn names_do_not_overlap_and_stay_inside() {

@@ -8,10 +8,10 @@ mod rows;
 mod scale;
 mod style;
 
-pub use plot::{Axis, Curve, Mark, Plot};
+pub use plot::{Axis, Curve, Mark, Names, Plot};
 pub use rows::{Bar, Row, Rows, Segment};
 pub use scale::{Kind, Scale, Tick};
-pub use style::{Style, Styles, key};
+pub use style::{Style, Styles, key, swatch};
 
 /// A position in a chart, to a twentieth of a unit: no screen shows more.
 fn px(v: f64) -> String {

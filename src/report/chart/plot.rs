@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use crate::metrics::Estimate;
-use crate::report::chart::labels::{Wanted, place};
+use crate::report::chart::labels::{Wanted, column, place};
 use crate::report::chart::{Kind, Scale, Style, px};
 use crate::study::record::Promised;
 use crate::study::throughput::Spread;
@@ -32,7 +32,7 @@ pub struct Mark {
     pub says: String,
     /// Whether it lies on the Pareto front.
     pub front: bool,
-    /// Whether a marker is drawn: a curve of many points has few.
+    /// Whether it is marked: on a curve of many points few are.
     pub marked: bool,
 }
 
@@ -64,14 +64,28 @@ pub struct Plot {
     pub curves: Vec<Curve>,
     /// Whether the Pareto front is drawn.
     pub front: bool,
-    /// The sample count at whose points designs are named; none are named without.
-    pub named_at: Option<u32>,
+    /// Where designs are named.
+    pub names: Names,
     /// A value that is marked by a line across.
     pub line: Option<f64>,
 }
 
+/// Where designs are named in a chart. The legend names them all.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Names {
+    /// Nowhere.
+    None,
+    /// By their points at a sample count, where there is room.
+    At(u32),
+    /// In a column beside their last points.
+    Beside,
+}
+
 /// Space beside the plot: left, top, right, bottom.
 const MARGIN: [f64; 4] = [66.0, 14.0, 14.0, 50.0];
+/// Width of the column of names, and how many letters fit in it.
+const COLUMN: f64 = 216.0;
+const LETTERS: usize = 31;
 
 impl Plot {
     /// The chart; `None` without any point.
@@ -81,7 +95,8 @@ impl Plot {
             return None;
         }
         let [width, height] = self.size;
-        let frame = [MARGIN[0], MARGIN[1], width - MARGIN[2], height - MARGIN[3]];
+        let beside = if self.names == Names::Beside { COLUMN } else { 0.0 };
+        let frame = [MARGIN[0], MARGIN[1], width - MARGIN[2] - beside, height - MARGIN[3]];
         let along = marks.iter().flat_map(|m| [m.cost.low, m.cost.median, m.cost.high]);
         let x = Scale::new(self.x.kind, along, [frame[0], frame[2]]);
         // An interval that reaches 0 must not draw the axis down to it.
@@ -92,7 +107,7 @@ impl Plot {
         let y = Scale::new(self.y.kind, up.chain(self.line), [frame[3], frame[1]]);
         let view = format!("0 0 {} {}", px(width), px(height));
         Some(html! {
-            svg class="plot" viewBox=(view) role="group" tabindex="0" aria-label=(self.title) {
+            svg class=(if beside > 0.0 { "plot lines" } else { "plot" }) viewBox=(view) role="group" tabindex="0" aria-label=(self.title) {
                 (self.axes(&x, &y, frame))
                 @if let Some(line) = self.line {
                     line class="mean" x1=(px(frame[0])) x2=(px(frame[2])) y1=(px(y.at(line)))
@@ -100,7 +115,11 @@ impl Plot {
                 }
                 @if self.front { (self.front_line(&x, &y, frame)) }
                 @for curve in &self.curves { (self.curve(curve, &x, &y)) }
-                (self.names(&x, &y, frame))
+                @match self.names {
+                    Names::None => {},
+                    Names::At(count) => { (self.names_at(count, &x, &y, frame)) },
+                    Names::Beside => { (self.names_beside(&x, &y, frame)) },
+                }
             }
         })
     }
@@ -177,18 +196,42 @@ impl Plot {
                 data-any-order=[promised.and_then(|p| yes(p.any_order))]
                 data-one-pass=[curve.facts.and_then(|(_, passes)| yes(passes <= 1))] {
                 @if line.len() > 1 {
-                    polyline class="join" points=(line.join(" ")) {}
+                    polyline class="join" data-id=[self.whole(curve)] points=(line.join(" ")) {}
                 }
-                @for m in &curve.marks { (mark(m, curve, x, y)) }
+                @for m in curve.marks.iter().filter(|m| m.marked) { (mark(m, curve, x, y)) }
             }
         }
     }
 
-    fn names(&self, x: &Scale, y: &Scale, frame: [f64; 4]) -> Markup {
-        let Some(count) = self.named_at else { return html! {} };
+    /// The record of a curve that is all of one.
+    fn whole<'a>(&self, curve: &'a Curve) -> Option<&'a str> {
+        let first = curve.marks.first()?;
+        let one = curve.marks.iter().all(|m| m.id == first.id);
+        first.id.as_deref().filter(|_| one && curve.marks.len() > 1)
+    }
+
+    fn names_beside(&self, x: &Scale, y: &Scale, frame: [f64; 4]) -> Markup {
+        let ends: Vec<(&Curve, [f64; 2])> = self
+            .curves
+            .iter()
+            .filter_map(|c| c.marks.last().map(|m| (c, [x.at(m.cost.median), y.at(m.error.value)])))
+            .collect();
+        let heights: Vec<f64> = ends.iter().map(|(_, at)| at[1]).collect();
+        let heights = column(&heights, frame[1] + 4.0, frame[3]);
+        html! {
+            g class="names" aria-hidden="true" {
+                @for ((curve, at), height) in ends.iter().zip(heights) {
+                    path class="leader" d=(format!("M{},{}L{},{}", px(at[0] + 7.0), px(at[1]), px(frame[2] + 18.0), px(height))) {}
+                    text class=(format!("name {}", curve.style.class)) data-series=(curve.series)
+                        x=(px(frame[2] + 22.0)) y=(px(height)) dy="0.32em" { (short(&curve.series)) }
+                }
+            }
+        }
+    }
+
+    fn names_at(&self, count: u32, x: &Scale, y: &Scale, frame: [f64; 4]) -> Markup {
         let at = |m: &Mark| [x.at(m.cost.median), y.at(m.error.value)];
-        let marks: Vec<[f64; 2]> =
-            self.curves.iter().flat_map(|c| &c.marks).filter(|m| m.marked).map(at).collect();
+        let marks: Vec<[f64; 2]> = self.curves.iter().flat_map(|c| &c.marks).map(at).collect();
         // Names by points of the front first: they are what readers look for.
         let mut curves: Vec<&Curve> = self.curves.iter().filter(|c| !c.marks.is_empty()).collect();
         curves.sort_by_key(|c| !c.marks.iter().any(|m| m.front));
@@ -220,6 +263,14 @@ impl Plot {
     }
 }
 
+/// A name that fits its column.
+fn short(name: &str) -> String {
+    if name.chars().count() <= LETTERS {
+        return name.to_string();
+    }
+    name.chars().take(LETTERS - 1).chain(['…']).collect()
+}
+
 /// A point with its intervals and its numbers.
 fn mark(m: &Mark, curve: &Curve, x: &Scale, y: &Scale) -> Markup {
     let (at_x, at_y) = (x.at(m.cost.median), y.at(m.error.value));
@@ -241,7 +292,7 @@ fn mark(m: &Mark, curve: &Curve, x: &Scale, y: &Scale) -> Markup {
             @if spread {
                 path class="bar" d=(format!("M{},0H{}", px(x.at(m.cost.low) - at_x), px(x.at(m.cost.high) - at_x))) {}
             }
-            @if m.marked { path class="mk" d=(curve.style.marker) {} }
+            path class="mk" d=(curve.style.marker) {}
         }
     }
 }

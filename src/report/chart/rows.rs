@@ -2,6 +2,7 @@
 
 use maud::{Markup, html};
 
+use crate::report::chart::style::QUANTITIES;
 use crate::report::chart::{Kind, Scale, Style, px};
 
 /// What a row shows of one quantity.
@@ -12,8 +13,8 @@ pub enum Bar {
         /// The exact numbers: value, low, high.
         value: [f64; 3],
         /// What it is, as the attribute `data-measure` has it.
-        measure: &'static str,
-        /// CSS class: `a`, `b`, `c` for several quantities in a row.
+        measure: String,
+        /// Which of several quantities in a row: `a`, `b` or `c`.
         class: &'static str,
         /// What is said of it.
         says: String,
@@ -22,7 +23,7 @@ pub enum Bar {
     Box {
         /// First quartile, median, third quartile.
         quartiles: [f64; 3],
-        /// CSS class.
+        /// Which of several quantities in a row.
         class: &'static str,
     },
     /// Parts that add up.
@@ -35,7 +36,7 @@ pub struct Segment {
     /// The exact number; what is below 0 is drawn as nothing.
     pub value: f64,
     /// What it is, as the attribute `data-measure` has it.
-    pub measure: &'static str,
+    pub measure: String,
     /// CSS class.
     pub class: &'static str,
     /// What is said of it.
@@ -66,6 +67,8 @@ pub struct Rows {
     pub axis: String,
     /// How values lie on it.
     pub kind: Kind,
+    /// Whether a row's quantities lie on one line, not below each other.
+    pub together: bool,
     /// The rows, from the top.
     pub rows: Vec<Row>,
 }
@@ -80,9 +83,7 @@ impl Rows {
     /// The chart; `None` where no row shows anything.
     pub fn draw(&self) -> Option<Markup> {
         let bars = || self.rows.iter().flat_map(|r| &r.bars);
-        if bars().next().is_none() {
-            return None;
-        }
+        bars().next()?;
         let values = bars().flat_map(|bar| match bar {
             Bar::Dot { value, .. } => value.to_vec(),
             Bar::Box { quartiles, .. } => quartiles.to_vec(),
@@ -91,7 +92,7 @@ impl Rows {
         let longest = self.rows.iter().map(|r| r.series.chars().count()).max().unwrap_or(0);
         let left = (longest as f64 * 6.4 + 34.0).clamp(90.0, 300.0);
         let x = Scale::new(self.kind, values, [left, WIDTH - 20.0]);
-        let tall = |row: &Row| LANE * lanes(row) as f64 + GAP;
+        let tall = |row: &Row| LANE * self.lanes(row) as f64 + GAP;
         let bottom = TOP + self.rows.iter().map(tall).sum::<f64>();
         let view = format!("0 0 {} {}", px(WIDTH), px(bottom + 46.0));
         let mut top = TOP;
@@ -116,45 +117,47 @@ impl Rows {
                     text class="axis" x=(px((left + WIDTH - 20.0) / 2.0)) y=(px(bottom + 38.0))
                         text-anchor="middle" { (self.axis) }
                 }
-                @for (row, top) in self.rows.iter().zip(places) { (drawn(row, top, left, &x)) }
+                @for (row, top) in self.rows.iter().zip(places) { (self.drawn(row, top, left, &x)) }
             }
         })
     }
-}
 
-/// A box lies under the dot of the same class; all else has a lane of its own.
-fn lanes(row: &Row) -> usize {
-    let boxes = row.bars.iter().filter(|b| matches!(b, Bar::Box { .. })).count();
-    (row.bars.len() - boxes).max(1)
-}
+    /// A box lies under the dot of the same class; all else has a lane of its own.
+    fn lanes(&self, row: &Row) -> usize {
+        let boxes = row.bars.iter().filter(|b| matches!(b, Bar::Box { .. })).count();
+        if self.together { 1 } else { (row.bars.len() - boxes).max(1) }
+    }
 
-fn drawn(row: &Row, top: f64, left: f64, x: &Scale) -> Markup {
-    let middle = top + (LANE * lanes(row) as f64 + GAP) / 2.0;
-    let mut lane = 0;
-    let mut under = 0;
-    let mut place = |bar: &Bar| {
-        // Boxes and dots come in the same order.
-        let number = match bar {
-            Bar::Box { .. } => &mut under,
-            _ => &mut lane,
+    fn drawn(&self, row: &Row, top: f64, left: f64, x: &Scale) -> Markup {
+        let middle = top + (LANE * self.lanes(row) as f64 + GAP) / 2.0;
+        let mut lane = 0;
+        let mut under = 0;
+        let mut place = |bar: &Bar| {
+            // Boxes and dots come in the same order.
+            let number = match bar {
+                Bar::Box { .. } => &mut under,
+                _ => &mut lane,
+            };
+            let at = top + GAP / 2.0 + LANE * (f64::from(*number) + 0.5);
+            if !self.together {
+                *number += 1;
+            }
+            at
         };
-        let at = top + GAP / 2.0 + LANE * (f64::from(*number) + 0.5);
-        *number += 1;
-        at
-    };
-    html! {
-        g class=(format!("curve {}", row.style.class)) data-series=(row.series) {
-            g class="row-key" transform=(format!("translate({},{})", px(left - 12.0), px(middle))) {
-                path class="mk" d=(row.style.marker) {}
-            }
-            text class="row-name" x=(px(left - 24.0)) y=(px(middle)) dy="0.32em" text-anchor="end" {
-                (row.series)
-            }
-            @for bar in &row.bars { (shape(bar, row, place(bar), x)) }
-            @if !row.note.is_empty() {
-                @let beyond = if row.bars.is_empty() { left + 8.0 } else { WIDTH - 24.0 };
-                text class="note" x=(px(beyond)) y=(px(middle)) dy="0.32em"
-                    text-anchor=(if row.bars.is_empty() { "start" } else { "end" }) { (row.note) }
+        html! {
+            g class=(format!("curve {}", row.style.class)) data-series=(row.series) {
+                g class="row-key" transform=(format!("translate({},{})", px(left - 12.0), px(middle))) {
+                    path class="mk" d=(row.style.marker) {}
+                }
+                text class="row-name" x=(px(left - 24.0)) y=(px(middle)) dy="0.32em" text-anchor="end" {
+                    (row.series)
+                }
+                @for bar in &row.bars { (shape(bar, row, place(bar), x)) }
+                @if !row.note.is_empty() {
+                    @let beyond = if row.bars.is_empty() { left + 8.0 } else { WIDTH - 24.0 };
+                    text class="note" x=(px(beyond)) y=(px(middle)) dy="0.32em"
+                        text-anchor=(if row.bars.is_empty() { "start" } else { "end" }) { (row.note) }
+                }
             }
         }
     }
@@ -163,17 +166,17 @@ fn drawn(row: &Row, top: f64, left: f64, x: &Scale) -> Markup {
 fn shape(bar: &Bar, row: &Row, y: f64, x: &Scale) -> Markup {
     match bar {
         Bar::Dot { value: [value, low, high], measure, class, says } => html! {
-            g class=(format!("pt dot {class}")) transform=(format!("translate({},{})", px(x.at(*value)), px(y)))
+            g class=(format!("pt dot q-{class}")) transform=(format!("translate({},{})", px(x.at(*value)), px(y)))
                 data-id=(row.id) data-measure=(measure) data-value=(value) data-low=(low) data-high=(high) {
                 title { (says) }
                 @if low != high {
                     path class="bar" d=(format!("M{},0H{}", px(x.at(*low) - x.at(*value)), px(x.at(*high) - x.at(*value)))) {}
                 }
-                circle class="mk" r="4" {}
+                path class="mk" d=(QUANTITIES.iter().find(|(c, _)| c == class).map_or("", |(_, m)| m)) {}
             }
         },
         Bar::Box { quartiles: [first, median, third], class } => html! {
-            g class=(format!("box {class}")) data-id=(row.id) data-first=(first) data-median=(median)
+            g class=(format!("box q-{class}")) data-id=(row.id) data-first=(first) data-median=(median)
                 data-third=(third) {
                 rect x=(px(x.at(*first))) width=(px((x.at(*third) - x.at(*first)).max(0.5)))
                     y=(px(y - 4.5)) height="9" {}
@@ -192,7 +195,7 @@ fn shape(bar: &Bar, row: &Row, y: f64, x: &Scale) -> Markup {
                 .collect();
             html! {
                 @for (part, from) in parts.iter().zip(from) {
-                    g class=(format!("pt part {}", part.class)) transform=(format!("translate({},{})", px(x.at(from)), px(y)))
+                    g class=(format!("pt part q-{}", part.class)) transform=(format!("translate({},{})", px(x.at(from)), px(y)))
                         data-id=(row.id) data-measure=(part.measure) data-value=(part.value) {
                         title { (part.says) }
                         rect y="-5" height="10" width=(px((x.at(from + part.value.max(0.0)) - x.at(from)).max(0.0))) {}

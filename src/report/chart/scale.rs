@@ -96,13 +96,14 @@ impl Scale {
                 let values = (first..=last).map(|i| i as f64 * step);
                 values.map(|value| Tick { value, label: tidy(value) }).collect()
             }
-            Kind::Log2 => {
+            // Where there are fewer than two powers of two, decimal numbers say more.
+            Kind::Log2 if high.log2().floor() > low.log2().ceil() => {
                 let (first, last) = (low.log2().ceil() as i32, high.log2().floor() as i32);
                 let every = ((last - first) / 9 + 1) as usize;
                 let values = (first..=last).step_by(every).map(|e| 2_f64.powi(e));
                 values.map(|value| Tick { value, label: tidy(value) }).collect()
             }
-            Kind::Log => self.decimal_ticks(),
+            Kind::Log | Kind::Log2 => self.decimal_ticks(),
         }
     }
 
@@ -149,13 +150,14 @@ fn step_of(low: f64, high: f64) -> f64 {
     digit * power
 }
 
-/// A tick's number: no tail of rounding, thin spaces between thousands.
+/// A tick's number: no tail of rounding, thin spaces between thousands, M for millions.
 fn tidy(v: f64) -> String {
     let digits = format!("{v:.6}");
     let digits = digits.trim_end_matches('0').trim_end_matches('.');
     match digits {
         "0" | "-0" if v != 0.0 => format!("{v:e}"),
         "-0" => "0".to_string(),
+        _ if v.abs() >= 1e6 && (v / 1e5).fract() == 0.0 => format!("{} M", v / 1e6),
         _ if v.abs() >= 1e4 && v.fract() == 0.0 => crate::report::html::grouped(v as u64),
         _ => digits.replace('-', "−"),
     }

@@ -49,7 +49,10 @@ impl Styles {
             let colour = if known { family } else { "other" };
             let class =
                 format!("f-{colour} d{}{}", number % 4, if hollow { " hollow" } else { "" });
-            list.push((series.to_string(), Style { class, marker: MARKERS[number % MARKERS.len()] }));
+            list.push((
+                series.to_string(),
+                Style { class, marker: MARKERS[number % MARKERS.len()] },
+            ));
         }
         Styles { list }
     }
@@ -71,6 +74,20 @@ pub fn key(style: &Style) -> Markup {
     html! {
         svg class="key" viewBox="-8 -8 16 16" width="14" height="14" aria-hidden="true" {
             g class=(style.class) { path class="mk" d=(style.marker) {} }
+        }
+    }
+}
+
+/// Outline and CSS class of the first, second and third quantity within a row.
+pub(super) const QUANTITIES: [(&str, &str); 3] =
+    [("a", MARKERS[0]), ("b", MARKERS[1]), ("c", MARKERS[3])];
+
+/// The mark of a quantity beside text.
+pub fn swatch(class: &str) -> Markup {
+    let marker = QUANTITIES.iter().find(|(c, _)| *c == class).map_or(MARKERS[1], |(_, m)| m);
+    html! {
+        svg class="key" viewBox="-7 -7 14 14" width="11" height="11" aria-hidden="true" {
+            g class=(format!("q-{class}")) { path class="mk" d=(marker) {} }
         }
     }
 }

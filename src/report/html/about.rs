@@ -56,8 +56,17 @@ fn promises(told: Option<&[String]>, record: Option<&crate::study::record::Recor
 
 pub(super) fn scenes(content: &Content<'_>) -> Markup {
     let header = [
-        "scene", "source", "size", "fragments", "covered pixels", "fragments per covered pixel",
-        "95 % of pixels", "most", "mean alpha", "opaque, %", "samples",
+        "scene",
+        "source",
+        "size",
+        "fragments",
+        "covered pixels",
+        "fragments per covered pixel",
+        "95 % of pixels",
+        "most",
+        "mean alpha",
+        "opaque, %",
+        "samples",
     ];
     let count = |n: u64| Cell::Number(n as f64, grouped(n));
     let row = |name: &str| -> Vec<Cell> {

@@ -3,8 +3,8 @@
 use maud::{Markup, html};
 
 use crate::param::Options;
-use crate::report::chart::{Axis, Curve, Kind, Mark, Plot};
-use crate::report::html::parts::{Cell, Content, figure, nothing, tabs};
+use crate::report::chart::{Axis, Curve, Kind, Mark, Names, Plot};
+use crate::report::html::parts::{Cell, Content, figure, name, nothing, tabs};
 use crate::report::html::words::{counted, estimated, figures, fixed, listed};
 use crate::study::analysis::{
     Answer, BUDGETS, Budget, Candidate, Cost, Need, Point, Points, Separation, answers, baseline,
@@ -15,14 +15,14 @@ pub(super) fn section(content: &Content<'_>) -> Markup {
     let answers = answers(content.results);
     let on = baseline(&content.results.study);
     html! {
-        div class="answer" { @for sentence in lead(content, &answers) { p { (sentence) } } }
+        div class="answer" { @for sentence in lead(content, &answers) { p { (with_names(&sentence)) } } }
         h3 { "The least error for a need and a budget" }
         (figure("answers", &table(&answers), &html! {
-            "In each cell the design with the least error over all scenes, its samples per pixel, \
+            "In each cell the design with the least error over all scenes and its samples per pixel; \
              its error as a share of that of " code { (on.series) } " at " (on.samples)
-            " samples with a 95 % interval, its state and passes, and below it the best other \
-             design. " b { "=" } " no difference that these seeds show; " b { ">" }
-            " their intervals separate them; " b { "?" } " one seed tells nothing."
+            " samples, with a 95 % interval; its state and passes; and the best other design. It is " i { "ahead of" }
+            " that one where their intervals separate them, " i { "level with" } " it where these seeds show no \
+             difference, and " i { "before" } " it where one seed gives no interval."
         }, &content.study_command()))
         h3 { "Error against cost, all scenes" }
         (central(content))
@@ -50,23 +50,27 @@ fn passes(c: &Candidate<'_>) -> String {
 
 /// What the answers say, in sentences. Every word follows from the numbers.
 pub(super) fn lead(content: &Content<'_>, answers: &[Answer<'_>]) -> Vec<String> {
-    let find = |need: Need, budget: Budget| {
-        answers.iter().find(|a| a.need == need && a.budget == budget)
-    };
+    let find =
+        |need: Need, budget: Budget| answers.iter().find(|a| a.need == need && a.budget == budget);
     let on = baseline(&content.results.study);
     let mut text = Vec::new();
     let scenes = content.results.study.scenes.len();
-    let over = if scenes == 1 { "on the one scene".to_string() } else { format!("over {scenes} scenes") };
+    let over =
+        if scenes == 1 { "on the one scene".to_string() } else { format!("over {scenes} scenes") };
     let cases = [
         (Need::Any, Budget::Bounded, "With a fixed state per pixel"),
-        (Need::All, Budget::Bounded, "Of those that are unbiased, take fragments in any order and need one pass"),
+        (
+            Need::All,
+            Budget::Bounded,
+            "Of those that are unbiased, take fragments in any order and need one pass",
+        ),
         (Need::All, Budget::Bytes(64), "Of the same within 64 bytes per pixel"),
     ];
     let mut before: Option<(&str, u32)> = None;
     for (need, budget, start) in cases {
         let Some(answer) = find(need, budget) else { continue };
         let Some(best) = &answer.best else {
-            text.push(format!("{start}, none has results on all scenes."));
+            text.push(format!("{start}, none with results on all scenes meets this."));
             before = None;
             continue;
         };
@@ -81,7 +85,7 @@ pub(super) fn lead(content: &Content<'_>, answers: &[Answer<'_>]) -> Vec<String>
             "it is the baseline itself".to_string()
         } else {
             let of = if first {
-                format!(" times that of {} at {} samples", on.series, on.samples)
+                format!(" times that of {} at {} samples", spelt(on.series), on.samples)
             } else {
                 String::new()
             };
@@ -90,7 +94,7 @@ pub(super) fn lead(content: &Content<'_>, answers: &[Answer<'_>]) -> Vec<String>
         let over = if first { format!(" {over}") } else { String::new() };
         text.push(format!(
             "{start}, {} at {} has the least error{over}: {share}, with {} in {}. {}",
-            best.design,
+            spelt(best.design),
             counted(best.run.samples as usize, "sample"),
             bytes(best),
             passes(best),
@@ -101,26 +105,43 @@ pub(super) fn lead(content: &Content<'_>, answers: &[Answer<'_>]) -> Vec<String>
     text
 }
 
+/// A design's name within a sentence: between marks that no name has.
+fn spelt(design: &str) -> String {
+    format!("`{design}`")
+}
+
+/// A sentence with its designs' names set as such.
+fn with_names(sentence: &str) -> Markup {
+    html! {
+        @for (i, part) in sentence.split('`').enumerate() {
+            @if i % 2 == 1 { (name(part)) } @else { (part) }
+        }
+    }
+}
+
 /// What is said of the runner-up.
 fn second(answer: &Answer<'_>) -> String {
     let Some(second) = &answer.runner_up else {
         return "No other design meets this.".to_string();
     };
-    let name =
-        format!("{} at {}", second.design, counted(second.run.samples as usize, "sample"));
+    let whom =
+        format!("{} at {}", spelt(second.design), counted(second.run.samples as usize, "sample"));
     match answer.separation {
         Separation::Alone => String::new(),
         Separation::Apart(share) => format!(
-            "Next is {name} with {}, and the intervals separate the two: the first has {} times \
+            "Next is {whom} with {}, and the intervals separate the two: the first has {} times \
              its error.",
             figures(second.error.value),
             estimated(share)
         ),
         Separation::NoDifference(_) => {
-            format!("Between it and {name} there is no difference that these seeds show.")
+            format!("Between it and {whom} there is no difference that these seeds show.")
         }
         Separation::OneSeed => {
-            format!("Next is {name} with {}; one seed cannot tell them apart.", figures(second.error.value))
+            format!(
+                "Next is {whom} with {}; one seed cannot tell them apart.",
+                figures(second.error.value)
+            )
         }
     }
 }
@@ -135,10 +156,9 @@ fn left_out(content: &Content<'_>) -> Option<String> {
         };
         study.samples.iter().any(has)
     };
-    let gone: Vec<String> = study.designs.iter().filter(|s| !known(s)).cloned().collect();
-    (!gone.is_empty()).then(|| {
-        format!("Left out, since results are missing on some scene: {}.", listed(&gone))
-    })
+    let gone: Vec<String> = study.designs.iter().filter(|s| !known(s)).map(|s| spelt(s)).collect();
+    (!gone.is_empty())
+        .then(|| format!("Left out, since results are missing on some scene: {}.", listed(&gone)))
 }
 
 fn table(answers: &[Answer<'_>]) -> Markup {
@@ -166,18 +186,19 @@ fn table(answers: &[Answer<'_>]) -> Markup {
 
 fn cell(answer: &Answer<'_>) -> Markup {
     let Some(best) = &answer.best else { return html! { td class="none" { "none" } } };
-    let (sign, word) = match answer.separation {
-        Separation::Alone => ("", ""),
-        Separation::Apart(_) => (">", "the intervals separate them"),
-        Separation::NoDifference(_) => ("=", "no difference that these seeds show"),
-        Separation::OneSeed => ("?", "one seed gives no interval"),
+    let place = match answer.separation {
+        Separation::Alone => "",
+        Separation::Apart(_) => "ahead of",
+        Separation::NoDifference(_) => "level with",
+        Separation::OneSeed => "before",
     };
+    let decimals = |e: f64| if e == 0.0 { 0 } else { 3 };
     html! {
         td data-v=(best.error.value) data-low=(best.error.low) data-high=(best.error.high)
             data-series=(best.run.series) data-samples=(best.run.samples) {
-            span class="pick" { code { (best.run.series) } " " span class="at" { (best.run.samples) } }
+            span class="pick" { (name(best.design)) " at " (best.run.samples) }
             span class="value" {
-                b { (fixed(best.error.value, 3)) }
+                b { (fixed(best.error.value, decimals(best.error.value))) }
                 @if best.error.low != best.error.high {
                     " " span class="pm" { (fixed(best.error.low, 3)) "–" (fixed(best.error.high, 3)) }
                 }
@@ -190,9 +211,9 @@ fn cell(answer: &Answer<'_>) -> Markup {
                 ", " (passes(best))
             }
             @if let Some(second) = &answer.runner_up {
-                span class="small second" title=(word) {
-                    b { (sign) } " " code { (second.run.series) } " " (second.run.samples) ", "
-                    (fixed(second.error.value, 3))
+                span class="small second" {
+                    (place) " " (name(second.design)) " at " (second.run.samples) ", "
+                    (fixed(second.error.value, decimals(second.error.value)))
                 }
             }
         }
@@ -204,10 +225,8 @@ fn central(content: &Content<'_>) -> Markup {
     let panels: Vec<(String, Markup)> = Cost::ALL
         .iter()
         .zip(Cost::CHOICES)
-        .map(|(cost, choice)| (choice.name.to_string(), panel(content, *cost)))
+        .map(|(cost, choice)| (choice.help.to_string(), panel(content, *cost)))
         .collect();
-    let panels: Vec<_> =
-        panels.iter().zip(Cost::CHOICES).map(|((_, p), c)| (c.help.to_string(), p.clone())).collect();
     html! {
         div class="central" {
             fieldset class="filters" {
@@ -232,9 +251,9 @@ fn panel(content: &Content<'_>, cost: Cost) -> Markup {
     let all = points(content.results, None, cost);
     let y = Axis { title: "error relative to the baseline".into(), kind: Kind::Log };
     let plot = Plot {
-        title: format!("Error over all scenes against {}", cost.unit()),
+        title: format!("Error over all scenes against {}", axis(cost)),
         size: [720.0, 470.0],
-        named_at: Some(content.count),
+        names: Names::At(content.count),
         line: Some(1.0),
         ..plot(content, &all, cost, y)
     };
@@ -249,21 +268,25 @@ fn panel(content: &Content<'_>, cost: Cost) -> Markup {
     }
 }
 
+/// A cost with its unit.
+fn axis(cost: Cost) -> String {
+    format!("{}, {}", Cost::CHOICES[cost as usize].help, cost.unit())
+}
+
 fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or(String::new(), |c| c.to_uppercase().chain(letters).collect())
 }
 
 fn plot(content: &Content<'_>, all: &Points<'_>, cost: Cost, y: Axis) -> Plot {
-    let x = Axis {
-        title: cost.unit().to_string(),
-        kind: if cost == Cost::State { Kind::Log2 } else { Kind::Log },
-    };
+    let x =
+        Axis { title: axis(cost), kind: if cost == Cost::State { Kind::Log2 } else { Kind::Log } };
     let curves = content
         .designs()
         .iter()
         .filter_map(|series| {
-            let own: Vec<&Point<'_>> = all.known.iter().filter(|p| p.run.series == series).collect();
+            let own: Vec<&Point<'_>> =
+                all.known.iter().filter(|p| p.run.series == series).collect();
             let first = own.first()?;
             // A filter must not let through a design that needs more passes at more samples.
             let passes = own.iter().map(|p| p.passes).max().unwrap_or(0);
@@ -276,7 +299,7 @@ fn plot(content: &Content<'_>, all: &Points<'_>, cost: Cost, y: Axis) -> Plot {
         })
         .collect();
     let title = String::new();
-    Plot { title, x, y, size: [360.0, 290.0], curves, front: true, named_at: None, line: None }
+    Plot { title, x, y, size: [360.0, 290.0], curves, front: true, names: Names::None, line: None }
 }
 
 fn mark(p: &Point<'_>, cost: Cost) -> Mark {
@@ -306,9 +329,12 @@ fn mark(p: &Point<'_>, cost: Cost) -> Mark {
     }
 }
 
+/// A design and the sample counts at which it lacks.
+type Counts<'a> = (&'a str, Vec<String>);
+
 /// Who is not on a chart, reason by reason.
 fn absent(all: &Points<'_>) -> Markup {
-    let mut reasons: Vec<(&str, Vec<(&str, Vec<String>)>)> = Vec::new();
+    let mut reasons: Vec<(&str, Vec<Counts<'_>>)> = Vec::new();
     for (run, why) in &all.absent {
         let reason = match reasons.iter().position(|(w, _)| w == why) {
             Some(place) => place,
@@ -365,7 +391,7 @@ fn multiples(content: &Content<'_>, cost: Cost) -> Markup {
                     @let all = points(content.results, Some(scene), cost);
                     @let y = Axis { title: "RMSE, 8-bit units".into(), kind: Kind::Log };
                     @let plot = Plot {
-                        title: format!("RMSE on {scene} against {}", cost.unit()),
+                        title: format!("RMSE on {scene} against {}", axis(cost)),
                         ..plot(content, &all, cost, y)
                     };
                     @match plot.draw() {

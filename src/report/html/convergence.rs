@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use crate::report::chart::{Axis, Curve, Kind, Mark, Plot};
+use crate::report::chart::{Axis, Curve, Kind, Mark, Names, Plot};
 use crate::report::html::parts::{Cell, Content, figure, nothing, table};
 use crate::report::html::words::{counted, estimated};
 use crate::study::analysis::convergence;
@@ -62,10 +62,10 @@ fn chart(content: &Content<'_>, scene: &str) -> Markup {
         title: format!("RMSE on {scene} against samples per pixel"),
         x: Axis { title: "samples per pixel".into(), kind: Kind::Log2 },
         y: Axis { title: "RMSE, 8-bit units".into(), kind: Kind::Log },
-        size: [720.0, 440.0],
+        size: [860.0, 440.0],
         curves,
         front: false,
-        named_at: study.samples.iter().max().copied(),
+        names: Names::Beside,
         line: None,
     };
     html! {

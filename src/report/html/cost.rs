@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use crate::report::chart::{Bar, Kind, Row, Rows};
+use crate::report::chart::{Bar, Kind, Row, Rows, swatch};
 use crate::report::html::parts::{Cell, Content, command, figure, nothing, table};
 use crate::report::html::words::{figures, grouped, quoted};
 use crate::study::record::Record;
@@ -16,7 +16,7 @@ pub(super) fn section(content: &Content<'_>) -> Markup {
             "Fragments of the trace per second, from the file to the picture: medians, bars from quartile \
              to quartile. "
             @for (engine, class) in engines.iter().zip(CLASSES) {
-                span class=(format!("swatch {class}")) {} " " code { (engine) } " "
+                (swatch(class)) " " code { (engine) } " "
             }
             "This is how fast this program replays on this machine. It says nothing of a ROP in hardware."
         }, &throughput(content, &engines)))
@@ -87,7 +87,8 @@ fn speed(content: &Content<'_>, scene: &str, engines: &[String]) -> Markup {
                         figures(value[1] / 1e6),
                         figures(value[2] / 1e6)
                     );
-                    bars.push(Bar::Dot { value, measure: "fragments-per-second", class, says });
+                    let measure = format!("fragments-per-second-{engine}");
+                    bars.push(Bar::Dot { value, measure, class, says });
                 }
                 None => {
                     let why = timed.and_then(|s| s.missing.clone());
@@ -107,6 +108,7 @@ fn speed(content: &Content<'_>, scene: &str, engines: &[String]) -> Markup {
         title: format!("Fragments per second on {scene}"),
         axis: "fragments per second".into(),
         kind: Kind::Linear,
+        together: true,
         rows: content.designs().iter().map(row).collect(),
     };
     chart.draw().unwrap_or_else(|| nothing("Nothing was timed here."))
@@ -114,8 +116,16 @@ fn speed(content: &Content<'_>, scene: &str, engines: &[String]) -> Markup {
 
 fn counts(content: &Content<'_>, scene: &str) -> Markup {
     let header = [
-        "design", "tested", "passed", "written", "hashes", "comparators", "sorts", "surfaces",
-        "bytes read", "bytes written",
+        "design",
+        "tested",
+        "passed",
+        "written",
+        "hashes",
+        "comparators",
+        "sorts",
+        "surfaces",
+        "bytes read",
+        "bytes written",
     ];
     let row = |series: &String| -> Vec<Cell> {
         let mut cells = vec![Cell::Text(content.named(series))];

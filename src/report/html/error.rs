@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use crate::report::chart::{Bar, Kind, Row, Rows, Segment};
+use crate::report::chart::{Bar, Kind, Row, Rows, Segment, swatch};
 use crate::report::html::choice::share_cell;
 use crate::report::html::parts::{Cell, Content, figure, nothing, table};
 use crate::report::html::words::{figures, fixed};
@@ -26,8 +26,8 @@ pub(super) fn section(content: &Content<'_>) -> Markup {
         }, &again()))
         h3 { "Bias and variance at " (content.count) " samples" }
         (figure("bias", &content.by_scene(|scene| bias(content, scene)), &html! {
-            "Mean square error over covered pixels, split. " span class="swatch variance" {}
-            " Variance is noise, which more seeds or frames average away; " span class="swatch bias" {}
+            "Mean square error over covered pixels, split. " (swatch("variance"))
+            " Variance is noise, which more seeds or frames average away; " (swatch("bias"))
             " squared bias is not. The bias is estimated without bias of its own, so it scatters \
              around 0: what falls below is drawn as nothing. A design that no seed changes has its \
              whole error as bias."
@@ -75,7 +75,7 @@ fn parts(record: &Record) -> Option<(f64, f64)> {
     let e = &record.covered;
     match (e.variance, e.bias_squared) {
         (Some(variance), Some(bias)) => Some((variance, bias)),
-        _ => (!record.promises.seeded).then(|| (0.0, e.rmse.value * e.rmse.value)),
+        _ => (!record.promises.seeded).then_some((0.0, e.rmse.value * e.rmse.value)),
     }
 }
 
@@ -88,7 +88,7 @@ fn bias(content: &Content<'_>, scene: &str) -> Markup {
             let split = record.and_then(parts);
             let segment = |value: f64, measure: &'static str, name: &str| Segment {
                 value,
-                measure,
+                measure: measure.to_string(),
                 class: measure,
                 says: format!("{series}\n{name} {}", figures(value)),
             };
@@ -113,7 +113,7 @@ fn bias(content: &Content<'_>, scene: &str) -> Markup {
         .collect();
     let title = format!("Bias and variance on {scene}");
     let axis = "mean square error, squared 8-bit units".to_string();
-    let rows = Rows { title, axis, kind: Kind::Linear, rows };
+    let rows = Rows { title, axis, kind: Kind::Linear, together: true, rows };
     rows.draw().unwrap_or_else(|| nothing("No design's error could be split here."))
 }
 

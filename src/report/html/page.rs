@@ -86,7 +86,8 @@ pub(super) type Part = (String, String, Markup);
 pub fn page(results: &Results, extras: &Extras) -> String {
     let content = Content::new(results, extras);
     let own = |anchor: &str, title: &str, body: Markup| (anchor.into(), title.into(), body);
-    let mut parts: Vec<Part> = vec![own("choice", "Which design to build", choice::section(&content))];
+    let mut parts: Vec<Part> =
+        vec![own("choice", "Which design to build", choice::section(&content))];
     parts.extend(given(extras, Place::Pictures));
     parts.push(own("error", "Error", error::section(&content)));
     parts.push(own("perception", "Perception", perception::section(&content)));

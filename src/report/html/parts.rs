@@ -96,6 +96,15 @@ impl<'a> Content<'a> {
     }
 }
 
+/// A design's name, which may break where its parts do.
+pub(super) fn name(design: &str) -> Markup {
+    html! {
+        code {
+            @for part in design.split_inclusive([':', ',']) { (part) wbr; }
+        }
+    }
+}
+
 /// A command to copy.
 pub(super) fn command(text: &str) -> Markup {
     html! { p class="command" { code { (text) } } }
@@ -176,9 +185,8 @@ impl Cell {
 /// A table that can be sorted by its columns and scrolls in its own box. A column's head
 /// stands over numbers where any of its cells is one.
 pub(super) fn table(header: &[&str], rows: &[Vec<Cell>]) -> Markup {
-    let numeric = |column: usize| {
-        rows.iter().any(|r| !matches!(r.get(column), Some(Cell::Text(_)) | None))
-    };
+    let numeric =
+        |column: usize| rows.iter().any(|r| !matches!(r.get(column), Some(Cell::Text(_)) | None));
     html! {
         div class="scroll" tabindex="0" role="region" aria-label="Table" {
             table class="sortable" {

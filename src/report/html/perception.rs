@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use crate::metrics::Estimate;
-use crate::report::chart::{Axis, Bar, Curve, Kind, Mark, Plot, Row, Rows};
+use crate::report::chart::{Axis, Bar, Curve, Kind, Mark, Names, Plot, Row, Rows, swatch};
 use crate::report::html::page::{Place, given_within};
 use crate::report::html::parts::{Cell, Content, figure, nothing, table};
 use crate::report::html::words::{estimated, figures, fixed};
@@ -17,8 +17,8 @@ pub(super) fn section(content: &Content<'_>) -> Markup {
         (figure("flip", &content.by_scene(|scene| flip(content, scene)), &html! {
             "FLIP estimates the difference that a viewer sees when alternating between two pictures: 0 is \
              none, 1 the largest. Dots are means over the frame with 95 % intervals over seeds, boxes the \
-             weighted quartiles. " span class="swatch a" {} " on a display of standard range, "
-            span class="swatch b" {} " over all exposures in which something shows."
+             weighted quartiles. " (swatch("a")) " on a display of standard range, "
+            (swatch("b")) " over all exposures in which something shows."
         }, &content.study_command()))
         details {
             summary { "FLIP on all scenes" }
@@ -29,8 +29,8 @@ pub(super) fn section(content: &Content<'_>) -> Markup {
         h3 { "After a blur, at " (count) " samples" }
         (figure("filtered", &content.by_scene(|scene| filtered(content, scene)), &html! {
             "RMSE over covered pixels after a Gaussian on the error, in 8-bit units: what is left from \
-             afar. " span class="swatch a" {} " 0 px, " span class="swatch b" {} " 1 px, "
-            span class="swatch c" {} " 2 px of standard deviation. Noise falls; structure stays."
+             afar. " (swatch("a")) " 0 px, " (swatch("b")) " 1 px, "
+            (swatch("c")) " 2 px of standard deviation. Noise falls; structure stays."
         }, &content.study_command()))
         h3 { "Spectrum of the error at " (count) " samples" }
         (figure("spectrum", &content.by_scene(|scene| spectrum(content, scene)), &html! {
@@ -38,16 +38,18 @@ pub(super) fn section(content: &Content<'_>) -> Markup {
              noise lies level; power at high frequencies is seen less. Blueness: 0 dB for white noise, \
              above for blue."
         }, &content.study_command()))
+        h3 { "Flicker at " (count) " samples" }
+        (figure("flicker", &content.by_scene(|scene| flicker(content, scene)), &html! {
+            "Standard deviation over seeds of a covered pixel's linear value, in 8-bit units: what changes \
+             from frame to frame in a still scene where every frame has a seed of its own. Half of the \
+             pixels, and 95 % of them, have no more."
+        }, &html! { (content.study_command()) (content.replay_one()) }))
         (given_within(content.extras, Place::Perception))
     }
 }
 
 /// A row for each design, of what `bars` makes of its record.
-fn rows(
-    content: &Content<'_>,
-    scene: &str,
-    bars: impl Fn(&Record) -> Vec<Bar>,
-) -> Vec<Row> {
+fn rows(content: &Content<'_>, scene: &str, bars: impl Fn(&Record) -> Vec<Bar>) -> Vec<Row> {
     let row = |series: &String| {
         let record = content.at_count(scene, series);
         let bars = record.map(&bars).unwrap_or_default();
@@ -67,7 +69,7 @@ fn rows(
 }
 
 fn dot(e: Estimate, measure: &'static str, class: &'static str, says: String) -> Bar {
-    Bar::Dot { value: [e.value, e.low, e.high], measure, class, says }
+    Bar::Dot { value: [e.value, e.low, e.high], measure: measure.to_string(), class, says }
 }
 
 fn flip(content: &Content<'_>, scene: &str) -> Markup {
@@ -93,6 +95,7 @@ fn flip(content: &Content<'_>, scene: &str) -> Markup {
         title: format!("FLIP on {scene}"),
         axis: "FLIP".into(),
         kind: Kind::Linear,
+        together: false,
         rows: rows(content, scene, bars),
     };
     chart.draw().unwrap_or_else(|| nothing("FLIP was not measured here."))
@@ -116,8 +119,7 @@ fn filtered(content: &Content<'_>, scene: &str) -> Markup {
     let bars = |r: &Record| {
         let styles = [("filtered-0", "a"), ("filtered-1", "b"), ("filtered-2", "c")];
         // Without a blur it is the error itself.
-        let mut left: Vec<(f64, Estimate)> =
-            r.filtered.iter().map(|f| (f.sigma, f.rmse)).collect();
+        let mut left: Vec<(f64, Estimate)> = r.filtered.iter().map(|f| (f.sigma, f.rmse)).collect();
         if left.is_empty() {
             return Vec::new();
         }
@@ -134,9 +136,34 @@ fn filtered(content: &Content<'_>, scene: &str) -> Markup {
         title: format!("Error after a blur on {scene}"),
         axis: "RMSE, 8-bit units".into(),
         kind: Kind::Linear,
+        together: true,
         rows: rows(content, scene, bars),
     };
     chart.draw().unwrap_or_else(|| nothing("Errors after a blur were not measured here."))
+}
+
+fn flicker(content: &Content<'_>, scene: &str) -> Markup {
+    let row = |series: &String| -> Vec<Cell> {
+        let mut cells = vec![Cell::Text(content.named(series))];
+        let record = content.at_count(scene, series);
+        match record.and_then(|r| r.covered.temporal) {
+            Some(t) => {
+                let each = [t.deviation_median, t.deviation_p95, t.deviation_max];
+                cells.extend(each.map(|v| Cell::Number(v, fixed(v, 2))));
+            }
+            None => {
+                let why = match record {
+                    None => "no result",
+                    Some(r) if r.promises.seeded => "one seed",
+                    Some(_) => "the same for every seed",
+                };
+                cells.extend((0..3).map(|_| Cell::Missing(why.into())));
+            }
+        }
+        cells
+    };
+    let rows: Vec<_> = content.designs().iter().map(row).collect();
+    table(&["design", "median", "95 %", "most"], &rows)
 }
 
 /// Every so many bins of a spectrum have a marker.
@@ -170,10 +197,10 @@ fn spectrum(content: &Content<'_>, scene: &str) -> Markup {
         title: format!("Spectrum of the error on {scene}"),
         x: Axis { title: "cycles per pixel".into(), kind: Kind::Linear },
         y: Axis { title: "power, squared 8-bit units".into(), kind: Kind::Log },
-        size: [720.0, 420.0],
+        size: [860.0, 430.0],
         curves: content.designs().iter().enumerate().filter_map(curve).collect(),
         front: false,
-        named_at: None,
+        names: Names::Beside,
         line: None,
     };
     let has = |series: &str| plot.curves.iter().any(|c| c.series == series);

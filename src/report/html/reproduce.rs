@@ -50,7 +50,10 @@ fn traces(content: &Content<'_>) -> Markup {
             Cell::Text(html! { code class="hash" { (s.content) } }),
         ]
     };
-    table(&["scene", "file", "content"], &content.results.scenes.iter().map(row).collect::<Vec<_>>())
+    table(
+        &["scene", "file", "content"],
+        &content.results.scenes.iter().map(row).collect::<Vec<_>>(),
+    )
 }
 
 fn records(content: &Content<'_>) -> Markup {
@@ -61,7 +64,9 @@ fn records(content: &Content<'_>) -> Markup {
             Cell::Number(f64::from(r.samples), r.samples.to_string()),
             Cell::Number(r.fragments as f64, grouped(r.fragments)),
             Cell::Estimate(r.covered.rmse, 3),
-            Cell::Text(html! { button type="button" class="copy" data-copy=(content.replay(r)) { "copy" } }),
+            Cell::Text(
+                html! { button type="button" class="copy" data-copy=(content.replay(r)) { "copy" } },
+            ),
         ]
     };
     let header = ["scene", "design", "samples", "fragments", "RMSE", "command"];

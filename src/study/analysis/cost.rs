@@ -42,7 +42,9 @@ impl Cost {
                 "depths compared for each fragment: depth tests, and the comparators of sorting \
                  networks"
             }
-            Cost::Cpu => "time of the fast engine on this machine's processor, median and quartiles",
+            Cost::Cpu => {
+                "time of the fast engine on this machine's processor, median and quartiles"
+            }
             Cost::Gpu => "time of the GPU engine from file to picture, median and quartiles",
         }
     }

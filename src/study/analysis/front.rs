@@ -40,9 +40,7 @@ pub struct Points<'a> {
 /// For each (cost, error), whether it lies on the Pareto front: no other is less in one
 /// and not more in the other. Equal points do not dominate each other.
 pub fn front(points: &[(f64, f64)]) -> Vec<bool> {
-    let beats = |a: (f64, f64), b: (f64, f64)| {
-        a.0 <= b.0 && a.1 <= b.1 && (a.0 < b.0 || a.1 < b.1)
-    };
+    let beats = |a: (f64, f64), b: (f64, f64)| a.0 <= b.0 && a.1 <= b.1 && (a.0 < b.0 || a.1 < b.1);
     points.iter().map(|p| !points.iter().any(|other| beats(*other, *p))).collect()
 }
 

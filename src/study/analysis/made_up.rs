@@ -2,12 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use crate::metrics::{EnsembleErrors, Estimate};
+use crate::metrics::{EnsembleErrors, Estimate, Temporal};
 use crate::rop::{EventCounts, StateBits};
 use crate::study::file::{SceneEntry, Study};
-use crate::study::record::{
-    Filtered, FlipOverSeeds, Promised, Record, SpectrumOverSeeds, Speed,
-};
+use crate::study::record::{Filtered, FlipOverSeeds, Promised, Record, SpectrumOverSeeds, Speed};
 use crate::study::results::{Machine, Missing, Results, SceneFacts};
 use crate::study::throughput::Spread;
 use crate::trace::{AlphaStatistics, Distribution, Objects, Statistics};
@@ -118,6 +116,7 @@ pub(crate) fn record(scene: &str, series: &str, samples: u32, rmse: Estimate) ->
         max: rmse.value * 8.0,
         variance: Some(rmse.value * rmse.value),
         bias_squared: Some(0.0),
+        temporal: None,
     };
     Record {
         id: format!("{scene}-{}-{samples}", design.replace([':', '=', ','], "_")),
@@ -228,7 +227,8 @@ fn plausible_record(scene: &str, place: usize, samples: u32, habit: &Habit) -> R
     let by = if seeded { 1.0 + 0.01 * (1.5 + scatter(1)) } else { 1.0 };
     let rmse = Estimate { value, low: value / by, high: value * by };
     let mut r = record(scene, name, samples, rmse);
-    r.design = name.replace("{n}", &samples.to_string()).replace("{2n}", &(2 * samples).to_string());
+    r.design =
+        name.replace("{n}", &samples.to_string()).replace("{2n}", &(2 * samples).to_string());
     r.id = format!("{scene}-{}-{samples}", r.design.replace([':', '=', ','], "_"));
     r.family = family.into();
     r.seeds = if seeded { 8 } else { 1 };
@@ -241,6 +241,11 @@ fn plausible_record(scene: &str, place: usize, samples: u32, habit: &Habit) -> R
     let square = value * value;
     r.covered.variance = seeded.then_some(square * (1.0 - bias * bias));
     r.covered.bias_squared = seeded.then_some(square * bias * bias + 0.002 * square * scatter(2));
+    r.covered.temporal = seeded.then_some(Temporal {
+        deviation_median: value * 0.6,
+        deviation_p95: value * 1.9,
+        deviation_max: value * 5.0,
+    });
     r.passes = match name {
         "depth-peeling:layers={n}" => samples,
         "mboit:moments=power4" | "mboit:moments=trigonometric3" => 2,
@@ -297,7 +302,7 @@ fn metrics(r: &mut Record, rmse: Estimate, scatter: &dyn Fn(u32) -> f64) {
     let square = rmse.value * rmse.value;
     let power = frequency.iter().map(|f| square * (1.0 + f * 8.0).powf(tilt)).collect();
     let blue = 10.0 * tilt;
-    let blueness = (square > 0.0)
-        .then_some(Estimate { value: blue, low: blue - 0.2, high: blue + 0.2 });
+    let blueness =
+        (square > 0.0).then_some(Estimate { value: blue, low: blue - 0.2, high: blue + 0.2 });
     r.spectrum = Some(SpectrumOverSeeds { frequency, power, blueness });
 }

@@ -15,7 +15,7 @@ mod relative;
 pub use choice::{
     Answer, BUDGETS, Budget, Candidate, Need, Separation, answer, answers, candidates,
 };
-pub use convergence::{Fitted, convergence};
+pub use convergence::convergence;
 pub use cost::Cost;
 pub use front::{Point, Points, front, points};
 pub use relative::{
