@@ -2,6 +2,7 @@
 //! and paper.
 
 mod about;
+mod against;
 mod choice;
 mod convergence;
 mod cost;

@@ -130,7 +130,7 @@ fn frame(content: &Content<'_>, parts: &[Part]) -> Markup {
                 // Before anything is drawn, so that nothing flickers.
                 script { (PreEscaped(
                     "document.documentElement.classList.add('js');\
-                     try{var t=localStorage.getItem('screendoor-theme');\
+                     try{const t=localStorage.getItem('screendoor-theme');\
                      if(t==='light'||t==='dark')document.documentElement.dataset.theme=t;}catch(e){}"
                 )) }
             }

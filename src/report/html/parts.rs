@@ -81,7 +81,7 @@ impl<'a> Content<'a> {
 
     /// A design's marker and name.
     pub fn named(&self, series: &str) -> Markup {
-        html! { span class="design" { (key(&self.styles.of(series))) code { (series) } } }
+        html! { span class="design" { (key(&self.styles.of(series))) (name(series)) } }
     }
 
     /// All designs with their markers: what a chart's marks mean.
@@ -171,7 +171,7 @@ impl Cell {
             Cell::Number(v, shown) => html! { td class="n" data-v=(v) { (shown) } },
             Cell::Estimate(e, decimals) => html! {
                 td class="n" data-v=(e.value) data-low=(e.low) data-high=(e.high) {
-                    (fixed(e.value, *decimals))
+                    (rounded(e.value, *decimals))
                     @if e.low != e.high {
                         " " span class="pm" { "±" (fixed(e.half_width(), *decimals)) }
                     }
@@ -180,6 +180,12 @@ impl Cell {
             Cell::Missing(why) => html! { td class="n none" title=(why) { "—" } },
         }
     }
+}
+
+/// A value with so many decimals; with more where it would round to 0 and is not.
+fn rounded(v: f64, decimals: usize) -> String {
+    let vanishes = v.abs() < 0.5 * 0.1_f64.powi(decimals as i32);
+    if vanishes { figures(v) } else { fixed(v, decimals) }
 }
 
 /// A table that can be sorted by its columns and scrolls in its own box. A column's head
