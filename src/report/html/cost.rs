@@ -12,14 +12,16 @@ pub(super) fn section(content: &Content<'_>) -> Markup {
     let engines = engines(content);
     html! {
         h3 { "Fragments per second at " (count) " samples" }
-        (figure("speed", &content.by_scene(|scene| speed(content, scene, &engines)), &html! {
+        @if content.results.records.iter().all(|r| r.speed.values().all(|s| s.seconds.is_none())) {
+            (nothing("Nothing was timed."))
+        } @else { (figure("speed", &content.by_scene(|scene| speed(content, scene, &engines)), &html! {
             "Fragments of the trace per second, from the file to the picture: medians, bars from quartile \
              to quartile. "
             @for (engine, class) in engines.iter().zip(CLASSES) {
                 (swatch(class)) " " code { (engine) } " "
             }
             "This is how fast this program replays on this machine. It says nothing of a ROP in hardware."
-        }, &throughput(content, &engines)))
+        }, &throughput(content, &engines))) }
         h3 { "What a ROP does for each fragment, at " (count) " samples" }
         (figure("counts", &content.by_scene(|scene| counts(content, scene)), &html! {
             "Events of the first seed for each fragment of the trace, over all passes. Comparators are \

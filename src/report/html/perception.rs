@@ -12,40 +12,79 @@ use crate::study::throughput::Spread;
 
 pub(super) fn section(content: &Content<'_>) -> Markup {
     let count = content.count;
+    let any = |has: &dyn Fn(&Record) -> bool| {
+        content.results.records.iter().any(|r| r.samples == count && has(r))
+    };
     html! {
         h3 { "FLIP at " (count) " samples" }
+        @if any(&|r| r.flip.is_some() || r.flip_hdr.is_some()) { (flip_section(content)) }
+        @else { (nothing("FLIP was not measured.")) }
+        h3 { "After a blur, at " (count) " samples" }
+        @if any(&|r| !r.filtered.is_empty()) { (filtered_section(content)) }
+        @else { (nothing("Errors after a blur were not measured.")) }
+        h3 { "Spectrum of the error at " (count) " samples" }
+        @if any(&|r| r.spectrum.is_some()) { (spectrum_section(content)) }
+        @else { (nothing("The spectrum was not measured.")) }
+        h3 { "Flicker at " (count) " samples" }
+        @if any(&|r| r.covered.temporal.is_some()) { (flicker_section(content)) }
+        @else { (nothing("Flicker was not measured: it takes more than one seed.")) }
+        (given_within(content.extras, Place::Perception))
+    }
+}
+
+fn flip_section(content: &Content<'_>) -> Markup {
+    html! {
         (figure("flip", &content.by_scene(|scene| flip(content, scene)), &html! {
             "FLIP estimates the difference that a viewer sees when alternating between two pictures: 0 is \
-             none, 1 the largest. Dots are means over the frame with 95 % intervals over seeds, boxes the \
+             none, 1 the largest. Marks are means over the frame with 95 % intervals over seeds, boxes the \
              weighted quartiles. " (swatch("a")) " on a display of standard range, "
             (swatch("b")) " over all exposures in which something shows."
         }, &content.study_command()))
         details {
             summary { "FLIP on all scenes" }
             (figure("flip-table", &flip_table(content), &html! {
-                "Mean FLIP on a display of standard range at " (count) " samples."
+                "Mean FLIP on a display of standard range at " (content.count) " samples."
             }, &content.study_command()))
         }
-        h3 { "After a blur, at " (count) " samples" }
-        (figure("filtered", &content.by_scene(|scene| filtered(content, scene)), &html! {
+    }
+}
+
+fn filtered_section(content: &Content<'_>) -> Markup {
+    figure(
+        "filtered",
+        &content.by_scene(|scene| filtered(content, scene)),
+        &html! {
             "RMSE over covered pixels after a Gaussian on the error, in 8-bit units: what is left from \
              afar. " (swatch("a")) " 0 px, " (swatch("b")) " 1 px, "
             (swatch("c")) " 2 px of standard deviation. Noise falls; structure stays."
-        }, &content.study_command()))
-        h3 { "Spectrum of the error at " (count) " samples" }
-        (figure("spectrum", &content.by_scene(|scene| spectrum(content, scene)), &html! {
-            "Radially averaged power spectrum of the error over the whole frame, mean over seeds. White \
-             noise lies level; power at high frequencies is seen less. Blueness: 0 dB for white noise, \
-             above for blue."
-        }, &content.study_command()))
-        h3 { "Flicker at " (count) " samples" }
-        (figure("flicker", &content.by_scene(|scene| flicker(content, scene)), &html! {
+        },
+        &content.study_command(),
+    )
+}
+
+fn spectrum_section(content: &Content<'_>) -> Markup {
+    figure(
+        "spectrum",
+        &content.by_scene(|scene| spectrum(content, scene)),
+        &html! {
+            "Radially averaged power spectrum of the error, mean over seeds. White noise lies level; power \
+             at high frequencies is seen less. Blueness: 0 dB for white noise, above for blue."
+        },
+        &content.study_command(),
+    )
+}
+
+fn flicker_section(content: &Content<'_>) -> Markup {
+    figure(
+        "flicker",
+        &content.by_scene(|scene| flicker(content, scene)),
+        &html! {
             "Standard deviation over seeds of a covered pixel's linear value, in 8-bit units: what changes \
              from frame to frame in a still scene where every frame has a seed of its own. Half of the \
              pixels, and 95 % of them, have no more."
-        }, &html! { (content.study_command()) (content.replay_one()) }))
-        (given_within(content.extras, Place::Perception))
-    }
+        },
+        &html! { (content.study_command()) (content.replay_one()) },
+    )
 }
 
 /// A row for each design, of what `bars` makes of its record.

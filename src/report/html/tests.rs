@@ -255,9 +255,9 @@ fn a_page_without_metrics_or_timing_says_so() {
     let html = page(&results, &extras());
     check(&html, &results).unwrap();
     for says in [
-        "FLIP was not measured here.",
-        "Nothing was timed here.",
-        "The spectrum was not measured here.",
+        "FLIP was not measured.",
+        "Nothing was timed.",
+        "The spectrum was not measured.",
         "one seed cannot",
         "Not timed with the engine fast",
         "None: every run of the study has a result.",
