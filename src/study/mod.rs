@@ -1,5 +1,6 @@
 //! From a trace and a plan to measured records: what every report is made of.
 
+pub mod analysis;
 pub mod comparison;
 pub mod engine;
 pub mod file;

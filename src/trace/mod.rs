@@ -29,5 +29,5 @@ pub use column::{ChannelColumn, Column, ColumnId, CoverageColumn, Native, Scalar
 pub use fragment::{DepthPlane, Fragment, MAX_SAMPLES, SampleMask, Unorm32};
 pub use header::{ColourFormat, FORMAT_VERSION, Header, MAX_SIDE, SamplePattern};
 pub use read::Trace;
-pub use stats::{Statistics, statistics};
+pub use stats::{AlphaStatistics, Distribution, Objects, Statistics, statistics};
 pub use write::{Compression, TraceWriter, WriteOptions, Written};

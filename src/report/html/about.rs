@@ -1,0 +1,177 @@
+//! What was measured, on what, and how.
+
+use maud::{Markup, html};
+
+use crate::param::Options;
+use crate::report::html::page::{Place, given_within};
+use crate::report::html::parts::{Cell, Content, command, figure, table};
+use crate::report::html::words::{fixed, grouped, quoted};
+use crate::study::analysis::{Cost, ROUNDING, baseline};
+
+pub(super) fn designs(content: &Content<'_>) -> Markup {
+    html! {
+        dl class="designs" {
+            @for series in content.designs() {
+                @let text = content.extras.designs.iter().find(|d| d.series == *series);
+                @let record = content.results.records.iter().find(|r| r.series == *series);
+                dt id=(format!("design-{}", anchor(series))) { (content.named(series)) }
+                dd {
+                    @if let Some(text) = text {
+                        p { (text.summary) }
+                        @if !text.citation.is_empty() { p class="citation" { (text.citation) } }
+                    }
+                    p class="promises" { (promises(text.map(|t| &t.promises[..]), record)) }
+                }
+            }
+        }
+        (command("screendoor designs"))
+        (given_within(content.extras, Place::Designs))
+    }
+}
+
+fn anchor(series: &str) -> String {
+    series.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect()
+}
+
+/// What a design promises: as it is told, or as its records have it.
+fn promises(told: Option<&[String]>, record: Option<&crate::study::record::Record>) -> String {
+    let mut words: Vec<String> =
+        record.iter().filter(|r| !r.family.is_empty()).map(|r| r.family.clone()).collect();
+    match (told, record) {
+        (Some(told), _) if !told.is_empty() => words.extend_from_slice(told),
+        (_, Some(r)) => {
+            let p = r.promises;
+            let list = [
+                (p.unbiased, "unbiased"),
+                (p.consistent, "consistent"),
+                (p.any_order, "independent of order"),
+                (!p.seeded, "the same for every seed"),
+            ];
+            words.extend(list.iter().filter(|(holds, _)| *holds).map(|(_, w)| w.to_string()));
+        }
+        (_, None) => words.push("no results".into()),
+    }
+    words.join(" · ")
+}
+
+pub(super) fn scenes(content: &Content<'_>) -> Markup {
+    let header = [
+        "scene",
+        "source",
+        "size",
+        "fragments",
+        "covered pixels",
+        "fragments per covered pixel",
+        "95 % of pixels",
+        "most",
+        "mean alpha",
+        "opaque, %",
+        "samples",
+    ];
+    let count = |n: u64| Cell::Number(n as f64, grouped(n));
+    let row = |name: &str| -> Vec<Cell> {
+        let mut cells = vec![Cell::text(name)];
+        let Some(s) = content.results.scenes.iter().find(|s| s.name == name) else {
+            cells.extend((1..header.len()).map(|_| Cell::Missing("no trace".into())));
+            return cells;
+        };
+        let t = &s.statistics;
+        let opaque = 100.0 * t.alpha.opaque as f64 / t.fragments.max(1) as f64;
+        cells.extend([
+            Cell::text(&s.source),
+            Cell::text(format!("{} × {}", s.size[0], s.size[1])),
+            count(t.fragments),
+            count(t.covered_pixels),
+            Cell::Number(t.depth_complexity.mean, fixed(t.depth_complexity.mean, 1)),
+            count(u64::from(t.depth_complexity.p95)),
+            count(u64::from(t.depth_complexity.max)),
+            Cell::Number(t.alpha.mean, fixed(t.alpha.mean, 2)),
+            Cell::Number(opaque, fixed(opaque, 0)),
+            count(u64::from(s.samples)),
+        ]);
+        cells
+    };
+    let first = content.results.scenes.first();
+    let again = html! {
+        @if let Some(s) = first { (command(&format!("screendoor info {}", quoted(&s.trace)))) }
+    };
+    html! {
+        (figure("scene-facts", &table(&header, &content.scenes().map(row).collect::<Vec<_>>()),
+            &html! { "The traces in numbers. Mean alpha is over fragments; opaque fragments have an alpha of 1." },
+            &again))
+        details {
+            summary { "Cameras" }
+            dl class="plain" {
+                @for s in &content.results.scenes { dt { (s.name) } dd { (s.camera) } }
+            }
+        }
+    }
+}
+
+pub(super) fn method(content: &Content<'_>) -> Markup {
+    let study = &content.results.study;
+    let on = baseline(study);
+    html! {
+        div class="prose" {
+            p {
+                "The fragments of each scene are recorded once, as a trace. Every design is given the \
+                 same fragments in the same order, at each sample count, with "
+                (study.seeds) " seeds where a seed changes anything, from seed " (study.first_seed)
+                " on. Its picture is held against the exact one: every sample's fragments sorted by depth \
+                 and composited."
+            }
+            dl class="definitions" {
+                dt { "Error" }
+                dd {
+                    "Root mean square over covered pixels and channels of picture minus exact picture of the \
+                     same samples, on linear values, in units of 1/255 of the range from black to white."
+                }
+                dt { "Relative error" }
+                dd {
+                    "RMSE divided by that of " code { (on.series) } " at " (on.samples)
+                    " samples on the same scene. Over all scenes the geometric mean, so that no scene \
+                     counts more for being harder. In it an RMSE below " (ROUNDING)
+                    " counts as that much: it is rounding. Without any error the share is 0. Where one \
+                     scene's result is missing there is no figure."
+                }
+                dt { "Intervals" }
+                dd {
+                    "95 % by Student's t over the seeds; half-widths of ratios add in quadrature on a \
+                     logarithmic scale. They say what other seeds would give on these scenes, and nothing \
+                     of other scenes. One seed has none."
+                }
+                dt { "Variance and bias" }
+                dd {
+                    "Per pixel over the seeds, averaged over covered pixels. The squared bias is the square \
+                     of the mean error less a share of the variance, so that it is 0 on average for an \
+                     unbiased design and can be negative."
+                }
+                dt { "FLIP" }
+                dd {
+                    "Andersson et al., FLIP: A Difference Evaluator for Alternating Images, 2020; for high \
+                     dynamic range Andersson et al., Visualizing Errors in Rendered High Dynamic Range \
+                     Images, 2021. No unit, 0 to 1."
+                }
+                dt { "Spectrum and blueness" }
+                dd {
+                    "Power density of the error by radial frequency in cycles per pixel, in squared 8-bit \
+                     units. Blueness in decibels."
+                }
+                dt { "Convergence" }
+                dd { "The exponent p of RMSE ∝ N" sup { "−p" } " through all sample counts, by least squares of logarithms." }
+                @for (cost, choice) in Cost::ALL.iter().zip(Cost::CHOICES) {
+                    dt { (choice.help) }
+                    dd { (sentence(cost.meaning())) " Unit: " (cost.unit()) "." }
+                }
+                dt { "Not modelled" }
+                dd { "Cycles, caches and bandwidth: events are counted, and what they cost in silicon is not." }
+            }
+        }
+    }
+}
+
+fn sentence(text: &str) -> String {
+    let mut letters = text.chars();
+    let first: String = letters.next().map_or(String::new(), |c| c.to_uppercase().collect());
+    format!("{first}{}.", letters.as_str())
+}

@@ -1,0 +1,19 @@
+//! A study's results as one page: a single file that needs no network, for screen, phone
+//! and paper.
+
+mod about;
+mod against;
+mod choice;
+mod convergence;
+mod cost;
+mod error;
+mod page;
+mod parts;
+mod perception;
+mod reproduce;
+#[cfg(test)]
+mod tests;
+mod words;
+
+pub use page::{DesignText, Extras, Place, Section, page};
+pub use words::grouped;
