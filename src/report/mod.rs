@@ -1,5 +1,6 @@
 //! Measured records as documents and pictures. Knows nothing of how runs are made.
 
+pub mod html;
 mod montage;
 mod results;
 
