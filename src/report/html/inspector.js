@@ -8,6 +8,11 @@ function depthText(depth, digits = 6) {
   return depth === 0xffffffff ? 'far' : (depth / 0xffffffff).toFixed(digits);
 }
 
+/** An opacity, short. */
+function alphaText(alpha) {
+  return alpha > 0 && alpha < 0.001 ? alpha.toExponential(2) : String(Number(alpha.toPrecision(4)));
+}
+
 function swatch(colour, title) {
   const element = make('span', { class: 'swatch', title });
   element.style.background = cssColour(colour);
@@ -111,7 +116,7 @@ function heldSamples(samples, before) {
 function heldField([name, value], before, samples) {
   const change = value === before ? '' : ' changed';
   let shown = value.split('; ').map((line) => make('span', { class: 'line' }, line));
-  if (name === 'covered' && /^\d+( \d+)+$/.test(value)) {
+  if (name === 'covered' && /^\d+( \d+)*$/.test(value)) {
     const set = new Set(value.split(' ').map(Number));
     shown = cellGrid(samples, 'set', `samples ${value}`, (s) => make('span', {
       class: set.has(s) ? 'cell in' : 'cell',
@@ -143,7 +148,7 @@ function stepRow(step, number, explained, before) {
   const passes = explained.steps.at(-1).pass > 0;
   const values = fragment.colour.map((v) => v.toFixed(4)).join(' ');
   const facts = [
-    ['alpha', String(Number(fragment.alpha.toPrecision(5)))],
+    ['alpha', alphaText(fragment.alpha)],
     ['depth', depthText(fragment.depth.z)],
     ['object', String(fragment.object)],
   ];
@@ -184,12 +189,14 @@ function story(explained) {
       more.remove();
     },
   }, `Show all ${steps.length} fragments`);
-  const head = ['', 'fragment', 'samples', 'reference values against alpha', 'the pixel after it'];
+  const head = [['', ''], ['', 'fragment'], ['', 'samples'], ['references-head', 'reference values against alpha'],
+    ['', 'the pixel after it']].map(([name, text]) => make('span', { class: name }, text));
+  const hasTests = steps.some(({ record }) => record.references.length > 0 || record.surface !== null || record.order);
   return [
     steps.length === 0 ? make('p', {}, 'No fragment of the trace covers this pixel.') : legend(samples),
-    make('div', { class: 'steps-frame', tabindex: 0, role: 'group', 'aria-label': 'fragments in API order' },
+    make('div', { class: hasTests ? 'steps-frame' : 'steps-frame no-tests', tabindex: 0, role: 'group', 'aria-label': 'fragments in API order' },
       steps.length === 0 ? null
-        : make('div', { class: 'steps-head', 'aria-hidden': 'true' }, head.map((h) => make('span', {}, h))),
+        : make('div', { class: 'steps-head', 'aria-hidden': 'true' }, head),
       list, more),
     make('p', { class: 'resolved' }, 'Resolved: ', swatch(colour), ' ',
       make('span', { class: 'figure' }, colour.map((v) => exactText(Math.fround(v))).join('  '))),

@@ -230,9 +230,9 @@ function viewer(section) {
   }
 
   /** A stroke that shows on anything: light, with a dark edge. */
-  function strokeTwice(context, colour) {
+  function strokeTwice(context, colour, light = 1) {
     const ratio = Math.max(1, Math.round(devicePixelRatio));
-    for (const [width, style] of [[3, 'rgb(0 0 0 / 55%)'], [1, colour]]) {
+    for (const [width, style] of [[light + 2, 'rgb(0 0 0 / 55%)'], [light, colour]]) {
       context.lineWidth = width * ratio;
       context.strokeStyle = style;
       context.stroke();
@@ -265,7 +265,7 @@ function viewer(section) {
     context.beginPath();
     const radius = size > 24 * devicePixelRatio ? size / 2 - 5 * devicePixelRatio : size / 2 + 5 * devicePixelRatio;
     context.roundRect(x + size / 2 - radius, y + size / 2 - radius, 2 * radius, 2 * radius, Math.min(radius, 8 * devicePixelRatio));
-    strokeTwice(context, '#ffd34d');
+    strokeTwice(context, '#ffd34d', 2);
   }
 
   // ---- values under the cross-hair --------------------------------------------
@@ -451,11 +451,15 @@ function viewer(section) {
     if (state.mode === 'flip' && !state.scene.hasFlip) state.mode = 'colour';
     state.cursor = null;
     panelsElement.style.setProperty('--ratio', state.scene.width / state.scene.height);
+    // The same designs as far as the scene has them, else others.
+    const { all } = state.scene;
+    const wanted = kept.map((name) => all.find((picture) => picture.name === name));
     state.panels.forEach((panel, i) => {
       panel.shown = null;
       panel.before = null;
       listPictures(panel);
-      show(panel, state.scene.all.find((picture) => picture.name === kept[i]) ?? state.scene.all[0]);
+      wanted[i] ??= all.find((picture) => !wanted.includes(picture)) ?? all[0];
+      show(panel, wanted[i]);
     });
     fit();
     const [x, y] = state.scene.pixel;
