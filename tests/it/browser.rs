@@ -64,6 +64,37 @@ fn stand_in(error: &Picture) -> Vec<f32> {
     pixels.map(|at| size(at).min(1.0) as f32).collect()
 }
 
+/// A scene as the viewer takes it; its pictures as EXR files in `folder`.
+fn viewed<'a>(made: &'a Made, folder: &Path) -> ViewedScene<'a> {
+    let Made { name, samples, pixel, reference, designs } = made;
+    let mut pictures = Vec::new();
+    for (at, Drawn { spec, picture, flip, told }) in designs.iter().enumerate() {
+        let exr = format!("{name}-{at}.exr");
+        let layers =
+            [Layer { name: "colour", picture }, Layer { name: "reference", picture: reference }];
+        write_exr(folder.join(&exr), &layers).unwrap();
+        pictures.push(ViewedPicture {
+            name: spec.to_string(),
+            picture,
+            flip: Some(flip),
+            figures: vec![("RMSE".into(), "4.59 ± 0.02".into())],
+            command: format!(
+                "screendoor replay {name}.arrow --design {spec} --samples {samples} --exact -o {exr}"
+            ),
+            exr,
+            explain: Some(told.clone()),
+        });
+    }
+    ViewedScene {
+        name: name.to_string(),
+        samples: *samples,
+        reference,
+        pictures,
+        pixel: *pixel,
+        trace: format!("{name}.arrow"),
+    }
+}
+
 /// Writes `report.html` and the EXR files of its pictures into `folder`.
 fn write_page(folder: &Path) -> PathBuf {
     let made = [
@@ -71,40 +102,7 @@ fn write_page(folder: &Path) -> PathBuf {
         make("glass", 4, [64, 64], &["lk", "enderton:mask=naive", "mlab"]),
         make("smoke", 64, [64, 64], &["lk", "wboit"]),
     ];
-    let scenes: Vec<ViewedScene<'_>> = made
-        .iter()
-        .map(|m| {
-            let view = |(at, drawn): (usize, &Drawn)| {
-                let Drawn { spec, picture, flip, told } = drawn;
-                let exr = format!("{}-{at}.exr", m.name);
-                let layers = [
-                    Layer { name: "colour", picture },
-                    Layer { name: "reference", picture: &m.reference },
-                ];
-                write_exr(folder.join(&exr), &layers).unwrap();
-                ViewedPicture {
-                    name: spec.to_string(),
-                    picture,
-                    flip: Some(flip),
-                    figures: vec![("RMSE".into(), "4.59 ± 0.02".into())],
-                    command: format!(
-                        "screendoor replay {}.arrow --design {spec} --samples {}",
-                        m.name, m.samples
-                    ),
-                    exr,
-                    explain: Some(told.clone()),
-                }
-            };
-            ViewedScene {
-                name: m.name.into(),
-                samples: m.samples,
-                reference: &m.reference,
-                pictures: m.designs.iter().enumerate().map(view).collect(),
-                pixel: m.pixel,
-                trace: format!("{}.arrow", m.name),
-            }
-        })
-        .collect();
+    let scenes: Vec<ViewedScene<'_>> = made.iter().map(|m| viewed(m, folder)).collect();
     let page = folder.join("report.html");
     let style = viewer::STYLE;
     let section = viewer::section(&scenes).into_string();

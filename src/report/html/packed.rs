@@ -16,7 +16,7 @@ use crate::picture::Picture;
 /// What a pixel's bits are foretold from.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum From {
+pub enum Source {
     /// Nothing.
     Nothing,
     /// The pixel to the left, in the first column nothing.
@@ -29,19 +29,19 @@ pub enum From {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 pub struct Prediction {
     /// What a pixel is foretold from.
-    pub from: From,
+    pub from: Source,
     /// Whether, after that, green is foretold from red and blue from green.
     pub channels: bool,
 }
 
 /// All ways to foretell a picture, the plain one first.
 const PREDICTIONS: [Prediction; 6] = [
-    Prediction { from: From::Nothing, channels: false },
-    Prediction { from: From::Nothing, channels: true },
-    Prediction { from: From::Left, channels: false },
-    Prediction { from: From::Left, channels: true },
-    Prediction { from: From::Reference, channels: false },
-    Prediction { from: From::Reference, channels: true },
+    Prediction { from: Source::Nothing, channels: false },
+    Prediction { from: Source::Nothing, channels: true },
+    Prediction { from: Source::Left, channels: false },
+    Prediction { from: Source::Left, channels: true },
+    Prediction { from: Source::Reference, channels: false },
+    Prediction { from: Source::Reference, channels: true },
 ];
 
 /// A picture as text.
@@ -64,7 +64,7 @@ pub fn pack_picture(picture: &Picture, reference: Option<&Picture>) -> PackedPic
         assert_eq!(r.grid(), picture.grid());
         self::words(r)
     });
-    let usable = PREDICTIONS.iter().filter(|p| p.from != From::Reference || reference.is_some());
+    let usable = PREDICTIONS.iter().filter(|p| p.from != Source::Reference || reference.is_some());
     let laid_out = usable.map(|p| (*p, lay_out(&words, width, reference.as_deref(), *p)));
     let (prediction, bytes) = laid_out
         .min_by_key(|(_, bytes)| deflate(bytes, Compression::fast()).len())
@@ -99,8 +99,8 @@ fn lay_out(
     prediction: Prediction,
 ) -> Vec<u8> {
     let foretold = |i: usize| match prediction.from {
-        From::Left if i % width > 0 => words[i - 1],
-        From::Reference => reference.expect("a reference")[i],
+        Source::Left if !i.is_multiple_of(width) => words[i - 1],
+        Source::Reference => reference.expect("a reference")[i],
         _ => [0; 3],
     };
     let left_over = (0..words.len()).map(|i| {
@@ -161,8 +161,8 @@ mod tests {
                 word[2] = word[2].wrapping_add(word[1]);
             }
             let before = match prediction.from {
-                From::Left if i % width > 0 => words[i - 1],
-                From::Reference => reference[i],
+                Source::Left if !i.is_multiple_of(width) => words[i - 1],
+                Source::Reference => reference[i],
                 _ => [0; 3],
             };
             words[i] = std::array::from_fn(|c| word[c].wrapping_add(before[c]));
@@ -196,7 +196,7 @@ mod tests {
             Picture::from_fn(grid, |_, _| std::array::from_fn(|_| random.unit().into()));
         let alone = pack_picture(&reference, None);
         let same = pack_picture(&reference, Some(&reference));
-        assert_eq!(same.prediction.from, From::Reference);
+        assert_eq!(same.prediction.from, Source::Reference);
         assert!(same.text.len() * 100 < alone.text.len());
     }
 }
