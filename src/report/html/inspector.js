@@ -143,9 +143,8 @@ function sortedOrder({ order }) {
 }
 
 /** One fragment's row. */
-function stepRow(step, number, explained, before) {
+function stepRow(step, number, { samples, severalPasses }, before) {
   const { fragment, record } = step;
-  const passes = explained.steps.at(-1).pass > 0;
   const values = fragment.colour.map((v) => v.toFixed(4)).join(' ');
   const facts = [
     ['alpha', alphaText(fragment.alpha)],
@@ -154,16 +153,16 @@ function stepRow(step, number, explained, before) {
   ];
   return make('li', { class: record.written.length > 0 ? 'step' : 'step idle' },
     make('div', { class: 'number' }, String(number),
-      passes ? make('span', { class: 'pass' }, `pass ${step.pass + 1}`) : null),
+      severalPasses ? make('span', { class: 'pass' }, `pass ${step.pass + 1}`) : null),
     make('div', { class: 'fragment', title: `row ${step.row} of the trace, primitive ${fragment.primitive}, colour ${values}` },
       swatch(fragment.colour, `colour ${values}`),
       make('dl', {}, facts.map(([name, value]) =>
         make('div', {}, make('dt', {}, name), make('dd', {}, value))))),
-    make('div', { class: 'tests' }, fate(step, explained.samples)),
+    make('div', { class: 'tests' }, fate(step, samples)),
     make('div', { class: 'opacity' },
       record.surface === null ? null : make('p', { class: 'surface' }, `starts surface ${record.surface}`),
       sortedOrder(record), referenceLine(step), referenceWords(step)),
-    make('div', { class: 'after' }, contents(step.contents, before, explained.samples)));
+    make('div', { class: 'after' }, contents(step.contents, before, samples)));
 }
 
 function legend(samples) {
@@ -173,12 +172,19 @@ function legend(samples) {
     item('refused', 'in front, not written'), item('written', 'written'));
 }
 
+/** A pass that does not look at the fragment, as Record::is_idle has it. */
+function isIdle({ record }) {
+  return record.samples_tested + record.written.length + record.state_bits_read + record.state_bits_written === 0;
+}
+
 /** The whole story of one pixel. */
 function story(explained) {
-  const { steps, cleared, samples, colour } = explained;
+  const { cleared, samples, colour } = explained;
+  const severalPasses = explained.steps.at(-1)?.pass > 0;
+  const steps = explained.steps.filter((step) => !severalPasses || !isIdle(step));
   const list = make('ol', { class: 'steps' });
   const rows = (from, to) => steps.slice(from, to).map((step, i) =>
-    stepRow(step, from + i + 1, explained, from + i > 0 ? steps[from + i - 1].contents : cleared));
+    stepRow(step, from + i + 1, { samples, severalPasses }, from + i > 0 ? steps[from + i - 1].contents : cleared));
   list.append(...rows(0, STEPS_AT_FIRST));
   const left = steps.length - STEPS_AT_FIRST;
   const more = left <= 0 ? null : make('button', {
