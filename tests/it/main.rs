@@ -1,6 +1,7 @@
 //! The integration tests: one binary, one file a subject.
 
 mod blended;
+mod browser;
 mod cli;
 mod conformance;
 mod events;

@@ -7,12 +7,14 @@ mod choice;
 mod convergence;
 mod cost;
 mod error;
+pub mod packed;
 mod page;
 mod parts;
 mod perception;
 mod reproduce;
 #[cfg(test)]
 mod tests;
+pub mod viewer;
 mod words;
 
 pub use page::{DesignText, Extras, Place, Section, page};
