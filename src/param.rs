@@ -145,6 +145,15 @@ pub trait Options: Copy + 'static {
     const CHOICES: &'static [Choice];
     /// The values.
     const ALL: &'static [Self];
+
+    /// The value's name.
+    fn name(self) -> &'static str
+    where
+        Self: PartialEq,
+    {
+        let named = Self::ALL.iter().zip(Self::CHOICES).find(|(value, _)| **value == self);
+        named.map_or("", |(_, choice)| choice.name)
+    }
 }
 
 /// Declares an enumeration whose variants can be named on the command line:

@@ -8,8 +8,8 @@ use crate::cli::arguments::{RunArguments, numbers};
 use crate::cli::console::{Console, shown};
 use crate::cli::files::{Json, check, report};
 use crate::error::{Error, Result};
-use crate::param::Values;
-use crate::rop::{Contents, Explanation, Site, Step};
+use crate::rop::{Contents, Site, Step};
+use crate::study::explained::Explained;
 use crate::trace::{SampleMask, Unorm32};
 
 /// Show what a design does at one pixel, fragment by fragment
@@ -28,18 +28,6 @@ pub(super) struct Arguments {
     json: Option<PathBuf>,
 }
 
-#[derive(serde::Serialize)]
-struct Document<'a> {
-    trace: &'a str,
-    design: &'a str,
-    parameters: &'a Values,
-    pixel: [u16; 2],
-    samples: u32,
-    seed: u32,
-    #[serde(flatten)]
-    explanation: &'a Explanation,
-}
-
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let outputs: Vec<&Path> = Json::path(&arguments.json).into_iter().collect();
     check(&[arguments.run.path()], &outputs)?;
@@ -55,23 +43,15 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let json = Json::open(&arguments.json)?;
     let progress = console.progress("searching", "fragments");
     let watch = |done, total| progress.set(done, total);
-    let mut explanation = design.explain(&trace, samples, seed, site, &watch)?;
+    let place = (&trace, trace.place());
+    let mut document = Explained::of(&design, place, samples, seed, site, &watch)?;
     drop(progress);
-    let passes = explanation.steps.last().map_or(1, |step| step.pass + 1);
-    // A pass for opaque fragments does not look at the others.
-    explanation.steps.retain(|step| passes == 1 || !step.record.is_idle());
+    let explanation = &mut document.explanation;
+    let passes = explanation.passes();
     let all = explanation.steps.len();
     let left_out = arguments.last.map_or(0, |last| all.saturating_sub(last));
     let before = explanation.steps.drain(..left_out).next_back().map(|step| step.contents);
-    let document = Document {
-        trace: trace.place(),
-        design: design.info().name,
-        parameters: design.values(),
-        pixel: [site.x, site.y],
-        samples,
-        seed,
-        explanation: &explanation,
-    };
+    let explanation = &document.explanation;
     report(json, &document, console, || {
         console.print(format_args!(
             "{} at pixel {},{} of {}: {samples} samples, seed {}",

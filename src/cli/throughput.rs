@@ -11,6 +11,7 @@ use crate::cli::files::{Json, check, open_trace, report};
 use crate::error::Result;
 use crate::gpu::{Adapter, Threads};
 use crate::study::engine::EngineName;
+use crate::study::machine::processor;
 use crate::study::throughput::{Plan, Spread, Throughput, measure};
 
 /// Measure how fast engines replay a trace: fragments, samples and bytes a second
@@ -175,11 +176,4 @@ fn print(document: &Document<'_>, console: &Console) -> Result<()> {
         "\nmedians (quartiles) of several replays; kernel and sorting by the GPU's own clock; \
          bytes are those that must move: columns and state, once a pass"
     ))
-}
-
-/// The processor's name, where the system tells it.
-fn processor() -> String {
-    let told = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let name = told.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':'));
-    name.map_or_else(|| std::env::consts::ARCH.to_string(), |(_, name)| name.trim().to_string())
 }

@@ -3,10 +3,13 @@
 pub mod analysis;
 pub mod comparison;
 pub mod engine;
+pub mod explained;
 pub mod file;
+pub mod machine;
 pub mod publications;
 pub mod record;
 pub mod results;
+pub mod run;
 pub mod throughput;
 
 use std::time::Instant;

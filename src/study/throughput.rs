@@ -78,11 +78,11 @@ pub struct Throughput {
     pub back: Option<Spread>,
 }
 
-/// Fragments, samples that they cover, and bytes of their columns.
+/// Fragments and samples that they cover.
 #[derive(Clone, Copy, Debug)]
-struct Work {
-    fragments: u64,
-    covered: u64,
+pub(super) struct Work {
+    pub fragments: u64,
+    pub covered: u64,
 }
 
 /// Measures all of `plan` on `engines`, one after the other within each design and count, so
@@ -209,7 +209,7 @@ impl<'a> Case<'a> {
 }
 
 /// Fragments that cover one of the first samples, and how many of these they cover.
-fn work(trace: &Trace, samples: u32) -> Result<Work> {
+pub(super) fn work(trace: &Trace, samples: u32) -> Result<Work> {
     let mask = SampleMask::first(samples);
     let mut work = Work { fragments: 0, covered: 0 };
     for batch in trace.batches() {

@@ -33,6 +33,13 @@ pub struct Explanation {
     pub colour: [f64; 3],
 }
 
+impl Explanation {
+    /// How many passes over the trace there were.
+    pub fn passes(&self) -> u32 {
+        self.steps.last().map_or(1, |step| step.pass + 1)
+    }
+}
+
 /// Replays the fragments of pixel `site` alone and writes down what happens.
 ///
 /// # Errors

@@ -1,0 +1,123 @@
+//! Parts of a study put together.
+
+use std::fs::{self, File};
+use std::io;
+use std::path::Path;
+
+use crate::error::{Error, Result};
+use crate::output::OutputFile;
+use crate::study::record::Record;
+use crate::study::run::store::Store;
+
+/// Puts the parts in `parts` together in the folder of `into`. What is there already stays;
+/// done again it changes nothing.
+///
+/// # Errors
+/// [`Error::Config`] where a part is of another study; [`Error::Invalid`] where two parts
+/// had different traces for a scene, or differ in what is no measured time; [`Error::Io`].
+pub fn merge(into: &Store, parts: &[Store]) -> Result<()> {
+    // All is compared before anything is written.
+    for part in parts {
+        if part.study() != into.study() {
+            let (a, b) = (part.folder().display(), into.folder().display());
+            return Err(Error::config(
+                format_args!("{a} and {b} are parts of different studies"),
+                "put parts of one study together",
+            ));
+        }
+    }
+    for scene in 0..into.study().scenes.len() {
+        same_scene(into, parts, scene)?;
+    }
+    for job in into.jobs() {
+        let mut known: Option<(Record, &Store)> = None;
+        for store in std::iter::once(into).chain(parts) {
+            let Some(mut record) = store.record(job)? else { continue };
+            record.speed.clear();
+            match &known {
+                Some((other, place)) if *other != record => {
+                    let (a, b) = (place.folder().display(), store.folder().display());
+                    return Err(Error::invalid(
+                        store.record_file(&job.id).display(),
+                        format_args!("{a} and {b} have measured different errors for one run"),
+                        "were they measured by different versions? remove one of the two",
+                    ));
+                }
+                Some(_) => {}
+                None => known = Some((record, store)),
+            }
+        }
+    }
+    parts.iter().try_for_each(|part| bring(into, part))
+}
+
+fn same_scene(into: &Store, parts: &[Store], scene: usize) -> Result<()> {
+    let mut known: Option<(String, &Store)> = None;
+    for store in std::iter::once(into).chain(parts) {
+        let Some(facts) = store.facts(scene)? else { continue };
+        match &known {
+            Some((content, other)) if *content != facts.content => {
+                let (a, b) = (other.folder().display(), store.folder().display());
+                return Err(Error::invalid(
+                    store.scene_file(scene).display(),
+                    format_args!("{a} and {b} have different traces of scene '{}'", facts.name),
+                    "measure the parts from the same scene files, with one version",
+                ));
+            }
+            Some(_) => {}
+            None => known = Some((facts.content, store)),
+        }
+    }
+    Ok(())
+}
+
+/// Copies what a part has and the whole has not; records last.
+fn bring(into: &Store, part: &Store) -> Result<()> {
+    let study = part.study();
+    let copy = |path: &Path| copy(part, into, path);
+    for machine in part.machines()? {
+        into.add_machine(&machine)?;
+    }
+    for (scene, _) in study.scenes.iter().enumerate() {
+        copy(&part.scene_file(scene))?;
+        copy(&part.folder().join(part.trace_name(scene)))?;
+        for samples in &study.pictures {
+            copy(&part.folder().join(part.reference_name(scene, *samples)))?;
+        }
+    }
+    let verification = part.folder().join("verification");
+    for entry in fs::read_dir(&verification).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        if !name.as_encoded_bytes().starts_with(b".") {
+            copy(&entry.path())?;
+        }
+    }
+    for job in part.jobs() {
+        if part.record(job)?.is_some() {
+            copy(&part.folder().join(Store::picture_name(&job.id)))?;
+            copy(&part.explanation_file(&job.id))?;
+            copy(&part.record_file(&job.id))?;
+            let _ = fs::remove_file(into.failure_file(&job.id));
+        } else if into.record(job)?.is_none() {
+            copy(&part.failure_file(&job.id))?;
+        }
+    }
+    Ok(())
+}
+
+/// Copies a file of one folder to its place in another, unless it is there or there is none.
+fn copy(from: &Store, to: &Store, path: &Path) -> Result<()> {
+    let Ok(place) = path.strip_prefix(from.folder()) else { return Ok(()) };
+    let target = to.folder().join(place);
+    if target.exists() {
+        return Ok(());
+    }
+    let mut source = match File::open(path) {
+        Ok(file) => file,
+        Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(()),
+        Err(e) => return Err(Error::io("read", path, e)),
+    };
+    let mut file = OutputFile::create(&target)?;
+    io::copy(&mut source, &mut file).map_err(|e| Error::io("write", &target, e))?;
+    file.commit()
+}

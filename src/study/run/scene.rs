@@ -1,0 +1,206 @@
+//! A study's scenes as traces.
+
+use std::path::Path;
+
+use crate::capture::Capture;
+use crate::design::{REFERENCE, configure};
+use crate::error::{Error, Result};
+use crate::metrics::{Flip, PixelClasses, Region};
+use crate::output::OutputFile;
+use crate::picture::{Layer, Picture, write_exr};
+use crate::rop::ReplayOptions;
+use crate::scene;
+use crate::study::file::{Metric, SceneEntry};
+use crate::study::results::SceneFacts;
+use crate::study::run::store::Store;
+use crate::study::throughput::work;
+use crate::tile::{TILE_PIXELS, TileGrid, TileMap};
+use crate::trace::{Trace, TraceWriter, WriteOptions, statistics};
+
+/// What runs are told of.
+pub type Watch<'a> = &'a (dyn Fn(&str) + Sync);
+
+/// A scene that is being measured.
+pub(super) struct OpenScene {
+    /// Its place in the study.
+    pub index: usize,
+    /// Its trace.
+    pub trace: Trace,
+    /// What is told of it.
+    pub facts: SceneFacts,
+    /// The exact picture of all samples.
+    pub fine: Picture,
+    /// The pixels that fragments cover, of all samples.
+    pub fine_covered: Region,
+}
+
+impl OpenScene {
+    /// Opens the scene's trace; draws it where it is not there yet. `base` is the folder
+    /// that the study's paths are seen from.
+    ///
+    /// # Errors
+    /// As [`scene::load`], [`Trace::open`] and [`crate::design::Configured::replay`];
+    /// [`Error::Invalid`] where the trace is not the one that was measured before.
+    pub fn open(store: &Store, index: usize, base: &Path, watch: Watch<'_>) -> Result<Self> {
+        let entry = &store.study().scenes[index];
+        let own = store.folder().join(store.trace_name(index));
+        let (path, shown) = match &entry.trace {
+            Some(trace) => (base.join(trace), base.join(trace).display().to_string()),
+            None => {
+                if !own.exists() {
+                    watch(&format!("capturing {}", entry.name));
+                    draw(entry, base, &own)?;
+                }
+                (own, store.trace_name(index))
+            }
+        };
+        let trace = Trace::open(&path)?;
+        let facts = facts(store, index, &trace, shown, watch)?;
+        let all = trace.header().pattern.samples();
+        watch(&format!("{REFERENCE} at {all} on {}", entry.name));
+        let options =
+            ReplayOptions { memory: store.study().memory << 20, ..ReplayOptions::default() };
+        let fine = configure(REFERENCE, &[])?.replay(&trace, all, 0, &options)?.picture;
+        let fine_covered = PixelClasses::of(&trace, all)?.covered;
+        Ok(OpenScene { index, trace, facts, fine, fine_covered })
+    }
+}
+
+/// Draws a scene into the trace at `path`.
+fn draw(entry: &SceneEntry, base: &Path, path: &Path) -> Result<()> {
+    let source = entry.source.as_deref().unwrap_or("");
+    let located = scene::path_of(source).map(|_| base.join(source).display().to_string());
+    let mut scene = scene::load(located.as_deref().unwrap_or(source))?;
+    if let Some(texture) = &entry.texture {
+        scene.apply_texture(&base.join(texture))?;
+    }
+    if entry.white {
+        scene.whiten();
+    }
+    let options = entry.options();
+    let capture = Capture::new(&scene, &options)?;
+    let file = OutputFile::create(path)?;
+    let place = path.display().to_string();
+    let mut writer =
+        TraceWriter::new(file, &place, capture.header().clone(), WriteOptions::default())?;
+    capture.draw(&mut writer, &mut |_, _| ())?;
+    writer.finish()?.0.commit()
+}
+
+/// The facts of a scene, written where they are not there yet.
+fn facts(
+    store: &Store,
+    index: usize,
+    trace: &Trace,
+    shown: String,
+    watch: Watch<'_>,
+) -> Result<SceneFacts> {
+    let entry = &store.study().scenes[index];
+    let content = match trace.content() {
+        Some(content) => content.to_string(),
+        None => trace.verify(|_| ())?,
+    };
+    if let Some(facts) = store.facts(index)? {
+        if facts.content != content {
+            return Err(Error::invalid(
+                trace.place(),
+                format_args!("scene '{}' was another one when the study was begun", entry.name),
+                "bring its old trace back, or begin in another folder",
+            ));
+        }
+        return Ok(facts);
+    }
+    watch(&format!("counting {}", entry.name));
+    let header = trace.header();
+    let facts = SceneFacts {
+        name: entry.name.clone(),
+        trace: shown,
+        content,
+        size: [header.width, header.height],
+        samples: header.pattern.samples(),
+        source: header.source.clone(),
+        camera: header.camera.clone(),
+        pixel: match entry.pixel {
+            Some(pixel) => pixel,
+            None => telling_pixel(trace)?,
+        },
+        statistics: statistics(trace, |_| ())?,
+    };
+    Store::put(&store.scene_file(index), &facts)?;
+    Ok(facts)
+}
+
+/// Fragments in a pixel that are enough to see how a design works and few enough to read.
+const TELLING: u32 = 6;
+
+/// Of the pixels whose number of fragments is nearest [`TELLING`] the one nearest the
+/// frame's centre.
+fn telling_pixel(trace: &Trace) -> Result<[u16; 2]> {
+    let header = trace.header();
+    let grid = TileGrid::new(header.width, header.height);
+    let mut counts: TileMap<Box<[u32; TILE_PIXELS]>> = TileMap::new(grid);
+    for batch in trace.batches() {
+        for f in batch?.iter() {
+            let tile =
+                counts.get_or_insert_with(grid.tile(f.x, f.y), || Box::new([0; TILE_PIXELS]));
+            let count = &mut tile[TileGrid::within(f.x, f.y)];
+            *count = count.saturating_add(1);
+        }
+    }
+    let centre = [header.width / 2, header.height / 2];
+    let mut best = (u32::MAX, u64::MAX, centre);
+    for (tile, counts) in counts.touched() {
+        for (within, count) in counts.iter().enumerate().filter(|(_, c)| **c > 0) {
+            let (x, y) = grid.pixel(*tile, within);
+            let square = |a: u32, b: u32| u64::from(a.abs_diff(b)).pow(2);
+            let distance = square(x, centre[0]) + square(y, centre[1]);
+            best = best.min((count.abs_diff(TELLING), distance, [x, y]));
+        }
+    }
+    Ok(best.2.map(|c| c as u16))
+}
+
+/// What all runs at one sample count of a scene share.
+pub(super) struct Reference {
+    pub samples: u32,
+    /// The exact picture of the same samples.
+    pub picture: Picture,
+    pub frame: Region,
+    pub classes: PixelClasses,
+    /// Fragments that cover one of the samples.
+    pub fragments: u64,
+    /// Comparison to the picture as a viewer sees it, where it is asked for.
+    pub flip: Option<Flip>,
+}
+
+impl Reference {
+    /// Makes it, and keeps the picture where the study keeps pictures.
+    ///
+    /// # Errors
+    /// As [`crate::design::Configured::replay`]; [`Error::Io`] where the picture cannot
+    /// be written.
+    pub fn of(store: &Store, scene: &OpenScene, samples: u32) -> Result<Self> {
+        let study = store.study();
+        let trace = &scene.trace;
+        trace.header().pattern.prefix(samples)?;
+        let picture = if samples == trace.header().pattern.samples() {
+            scene.fine.clone()
+        } else {
+            let options = ReplayOptions { memory: study.memory << 20, ..ReplayOptions::default() };
+            configure(REFERENCE, &[])?.replay(trace, samples, 0, &options)?.picture
+        };
+        if study.pictures.contains(&samples) {
+            let path = store.folder().join(store.reference_name(scene.index, samples));
+            write_exr(path, &[Layer { name: "colour", picture: &picture }])?;
+        }
+        let seen = [Metric::Flip, Metric::FlipHdr].iter().any(|m| study.takes(*m));
+        Ok(Reference {
+            samples,
+            frame: Region::frame(picture.grid()),
+            classes: PixelClasses::of(trace, samples)?,
+            fragments: work(trace, samples)?.fragments,
+            flip: seen.then(|| Flip::new(&picture)),
+            picture,
+        })
+    }
+}

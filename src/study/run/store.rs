@@ -1,0 +1,301 @@
+//! A study's folder: what has been measured, file by file, each whole or not there.
+
+use std::fs::{self, File, TryLockError};
+use std::io;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use crate::error::{Error, Result};
+use crate::output::OutputFile;
+use crate::param::Options;
+use crate::study::file::{Publication, Study, read_text};
+use crate::study::record::Record;
+use crate::study::results::{Machine, Missing, Results, SceneFacts};
+use crate::study::run::tasks::{Job, jobs};
+
+/// The folder of a study.
+///
+/// `study.toml` says what is measured here; a run's result is one file, written when
+/// all else of the run is there. So the folder is whole at every moment.
+#[derive(Debug)]
+pub struct Store {
+    folder: PathBuf,
+    study: Study,
+    jobs: Vec<Job>,
+    /// Held while this program writes here; the system lets go of it when the program ends.
+    _lock: Option<File>,
+}
+
+/// The folders in a study's folder.
+const FOLDERS: [&str; 6] = ["scenes", "traces", "runs", "pictures", "explain", "verification"];
+const STUDY: &str = "study.toml";
+const MACHINES: &str = "machine.json";
+
+impl Store {
+    /// Begins the folder of `study`, or goes on with it.
+    ///
+    /// # Errors
+    /// [`Error::Config`] where the folder is another study's or something else's, or
+    /// another program writes there; [`Error::Io`] where it cannot be written.
+    pub fn begin(folder: &Path, study: &Study) -> Result<Self> {
+        let create =
+            |path: &Path| fs::create_dir_all(path).map_err(|e| Error::io("create", path, e));
+        let path = folder.join(STUDY);
+        match path.try_exists() {
+            Ok(true) => {
+                let there = Study::read(&path)?;
+                if there != *study {
+                    return Err(Error::config(
+                        format_args!("{} holds another study, '{}'", folder.display(), there.name),
+                        "name another folder; a changed study is another one",
+                    ));
+                }
+            }
+            Ok(false) => {
+                let mut entries = fs::read_dir(folder).into_iter().flatten().flatten();
+                // Files under construction and the lock begin with a dot.
+                if entries.any(|e| !e.file_name().as_encoded_bytes().starts_with(b".")) {
+                    return Err(Error::config(
+                        format_args!("{} is not empty and holds no study", folder.display()),
+                        "name a new folder",
+                    ));
+                }
+                create(folder)?;
+            }
+            Err(e) => return Err(Error::io("read", &path, e)),
+        }
+        let lock = lock(folder)?;
+        FOLDERS.iter().try_for_each(|name| create(&folder.join(name)))?;
+        if !path.exists() {
+            OutputFile::put(&path, study_text(study).as_bytes())?;
+        }
+        Ok(Store::at(folder, study.clone(), Some(lock)))
+    }
+
+    /// Opens a folder to read it.
+    ///
+    /// # Errors
+    /// [`Error::Io`] where there is no study; as [`Study::read`].
+    pub fn open(folder: &Path) -> Result<Self> {
+        let path = folder.join(STUDY);
+        if !path.exists() {
+            let why = "no study has been measured there";
+            return Err(Error::io("read", folder, io::Error::new(io::ErrorKind::NotFound, why)));
+        }
+        Ok(Store::at(folder, Study::read(&path)?, None))
+    }
+
+    fn at(folder: &Path, study: Study, lock: Option<File>) -> Self {
+        let jobs = jobs(&study);
+        Store { folder: folder.to_path_buf(), study, jobs, _lock: lock }
+    }
+
+    /// The folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// The study.
+    pub fn study(&self) -> &Study {
+        &self.study
+    }
+
+    /// The study's runs.
+    pub fn jobs(&self) -> &[Job] {
+        &self.jobs
+    }
+
+    /// A scene's facts.
+    pub fn scene_file(&self, scene: usize) -> PathBuf {
+        self.folder.join("scenes").join(format!("{}.json", self.study.scenes[scene].name))
+    }
+
+    /// A drawn scene's trace, as seen from the folder.
+    pub fn trace_name(&self, scene: usize) -> String {
+        format!("traces/{}.arrow", self.study.scenes[scene].name)
+    }
+
+    /// A run's record.
+    pub fn record_file(&self, id: &str) -> PathBuf {
+        self.folder.join("runs").join(format!("{id}.json"))
+    }
+
+    /// Why a run has no record.
+    pub fn failure_file(&self, id: &str) -> PathBuf {
+        self.folder.join("runs").join(format!("{id}.failed"))
+    }
+
+    /// A run's picture of the first seed, as seen from the folder.
+    pub fn picture_name(id: &str) -> String {
+        format!("pictures/{id}.exr")
+    }
+
+    /// The exact picture at a sample count, as seen from the folder.
+    pub fn reference_name(&self, scene: usize, samples: u32) -> String {
+        format!("pictures/{}.{samples}.exact.exr", self.study.scenes[scene].name)
+    }
+
+    /// What a run does at the scene's pixel.
+    pub fn explanation_file(&self, id: &str) -> PathBuf {
+        self.folder.join("explain").join(format!("{id}.json"))
+    }
+
+    /// A publication's document.
+    pub fn document_file(&self, publication: Publication) -> PathBuf {
+        self.folder.join("verification").join(format!("{}.md", publication.name()))
+    }
+
+    /// A scene's facts, where its trace has been there.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for a damaged file; [`Error::Io`] where it cannot be read.
+    pub fn facts(&self, scene: usize) -> Result<Option<SceneFacts>> {
+        read(&self.scene_file(scene))
+    }
+
+    /// A run's record, where it is finished.
+    ///
+    /// # Errors
+    /// As [`Store::facts`].
+    pub fn record(&self, job: &Job) -> Result<Option<Record>> {
+        let path = self.record_file(&job.id);
+        let record: Option<Record> = read(&path)?;
+        let own = |r: &Record| {
+            (r.series.as_str(), r.samples) == (job.series.as_str(), job.samples)
+                && r.scene == self.study.scenes[job.scene].name
+        };
+        match record {
+            Some(record) if !own(&record) => Err(damaged(&path, "it is of another run")),
+            record => Ok(record),
+        }
+    }
+
+    /// Writes a value as JSON.
+    ///
+    /// # Errors
+    /// [`Error::Io`] where it cannot be written.
+    pub fn put<T: Serialize>(path: &Path, value: &T) -> Result<()> {
+        let mut bytes = serde_json::to_vec_pretty(value)
+            .map_err(|e| Error::io("write", path, io::Error::other(e)))?;
+        bytes.push(b'\n');
+        OutputFile::put(path, &bytes)
+    }
+
+    /// Puts down that a run could not be done.
+    ///
+    /// # Errors
+    /// As [`Store::put`].
+    pub fn put_failure(&self, job: &Job, why: &str) -> Result<()> {
+        Store::put(&self.failure_file(&job.id), &self.missing(job, Some(why.to_string())))
+    }
+
+    /// Puts down on which machine something was measured here.
+    ///
+    /// # Errors
+    /// As [`Store::facts`] and [`Store::put`].
+    pub fn add_machine(&self, machine: &Machine) -> Result<()> {
+        let mut machines = self.machines()?;
+        if machines.contains(machine) {
+            return Ok(());
+        }
+        machines.push(machine.clone());
+        Store::put(&self.folder.join(MACHINES), &machines)
+    }
+
+    /// The machines that have measured here.
+    ///
+    /// # Errors
+    /// As [`Store::facts`].
+    pub fn machines(&self) -> Result<Vec<Machine>> {
+        Ok(read(&self.folder.join(MACHINES))?.unwrap_or_default())
+    }
+
+    /// Everything that is there.
+    ///
+    /// # Errors
+    /// As [`Store::facts`].
+    pub fn results(&self) -> Result<Results> {
+        let mut results = Results {
+            study: self.study.clone(),
+            machine: Machine::together(&self.machines()?),
+            scenes: Vec::new(),
+            records: Vec::new(),
+            missing: Vec::new(),
+        };
+        for scene in 0..self.study.scenes.len() {
+            results.scenes.extend(self.facts(scene)?);
+        }
+        for job in &self.jobs {
+            match self.record(job)? {
+                Some(record) => results.records.push(record),
+                None => {
+                    let failure: Option<Missing> = read(&self.failure_file(&job.id))?;
+                    results.missing.push(self.missing(job, failure.and_then(|f| f.why)));
+                }
+            }
+        }
+        Ok(results)
+    }
+
+    fn missing(&self, job: &Job, why: Option<String>) -> Missing {
+        Missing {
+            id: job.id.clone(),
+            scene: self.study.scenes[job.scene].name.clone(),
+            series: job.series.clone(),
+            samples: job.samples,
+            why,
+        }
+    }
+}
+
+/// The study as its folder has it.
+fn study_text(study: &Study) -> String {
+    format!(
+        "# The study whose results lie here, every default filled in; paths are seen from the\n\
+         # folder of the file that it was read from. Written by screendoor {}.\n\n{}",
+        env!("CARGO_PKG_VERSION"),
+        study.to_toml()
+    )
+}
+
+fn lock(folder: &Path) -> Result<File> {
+    let path = folder.join(".lock");
+    let file = File::options().create(true).truncate(false).write(true).open(&path);
+    let file = file.map_err(|e| Error::io("create", &path, e))?;
+    match file.try_lock() {
+        Err(TryLockError::WouldBlock) => Err(Error::config(
+            format_args!("another screendoor is at work in {}", folder.display()),
+            "wait for it to end, or name another folder",
+        )),
+        // Some file systems have no locks: files are whole there too.
+        Ok(()) | Err(TryLockError::Error(_)) => Ok(file),
+    }
+}
+
+/// The value in a file of JSON; `None` where there is no file.
+pub(super) fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>> {
+    let bytes = match fs::read(path) {
+        Ok(bytes) => bytes,
+        Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
+        Err(e) => return Err(Error::io("read", path, e)),
+    };
+    serde_json::from_slice(&bytes).map(Some).map_err(|e| damaged(path, &e.to_string()))
+}
+
+fn damaged(path: &Path, what: &str) -> Error {
+    Error::invalid(path.display(), what, "remove it to have it measured again")
+}
+
+/// The text of a publication's document, where it has been measured.
+///
+/// # Errors
+/// [`Error::Io`] where it cannot be read.
+pub fn document(store: &Store, publication: Publication) -> Result<Option<String>> {
+    let path = store.document_file(publication);
+    if !path.exists() {
+        return Ok(None);
+    }
+    read_text(&path).map(Some)
+}
