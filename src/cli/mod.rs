@@ -10,9 +10,11 @@ mod explain;
 mod files;
 mod info;
 mod replay;
+mod report;
 mod reproduce;
 mod scenes;
 mod signals;
+mod study;
 mod throughput;
 mod verify;
 
@@ -41,6 +43,9 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Report(report::Arguments),
+    Study(study::Arguments),
+    Merge(study::MergeArguments),
     Demo(demo::Arguments),
     Capture(Box<capture::Arguments>),
     Info(info::Arguments),
@@ -79,6 +84,9 @@ fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         pool.map_err(|e| Error::config(e, "ask for fewer threads"))?;
     }
     match &arguments.command {
+        Command::Report(a) => report::run(a, console),
+        Command::Study(a) => study::run(a, console),
+        Command::Merge(a) => study::run_merge(a, console),
         Command::Demo(a) => demo::run(a, console),
         Command::Capture(a) => capture::run(a, console),
         Command::Info(a) => info::run(a, console),

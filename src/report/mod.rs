@@ -1,10 +1,12 @@
 //! Measured records as documents and pictures. Knows nothing of how runs are made.
 
 pub mod chart;
+mod folder;
 pub mod html;
 mod montage;
 mod results;
 
+pub use folder::{About, PAGE, write_report};
 pub use montage::{Panel, montage};
 pub use results::{FIGURES, Figure, Measured, Part, results};
 

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::capture::{CameraOptions, CaptureOptions, Faces, Order, PatternKind};
+use crate::capture::{CameraOptions, CaptureOptions, Faces, Order, PatternKind, pattern};
 use crate::design::{Configured, configure};
 use crate::error::{Error, Result};
 use crate::study::engine::EngineName;
@@ -203,6 +203,14 @@ impl Study {
         Study::parse(&text, &path.display().to_string())
     }
 
+    /// The study that the built-in scenes are measured with where none is named.
+    ///
+    /// # Errors
+    /// None: the file is tested.
+    pub fn preset() -> Result<Self> {
+        Study::parse(include_str!("default.toml"), "the default study")
+    }
+
     /// The study as TOML, every default filled in.
     pub fn to_toml(&self) -> String {
         toml::to_string(self).expect("a study's fields are values that TOML has")
@@ -315,11 +323,18 @@ impl SceneEntry {
             let count = self.captured_samples;
             return Err(out_of_range("captured_samples", count, "1, 2, 4, 8, 16, 32 or 64"));
         }
-        if let Some(count) = samples.iter().find(|s| **s > self.captured_samples) {
-            return Err(Error::config(
-                format_args!("scene '{name}' is captured with fewer than {count} samples"),
-                "raise captured_samples",
-            ));
+        if self.trace.is_none() {
+            let recorded = pattern(self.pattern, self.captured_samples)?;
+            let lacks = |count: &&u32| recorded.prefix(**count).is_err();
+            if let Some(count) = samples.iter().find(lacks) {
+                return Err(Error::config(
+                    format_args!(
+                        "scene '{name}' is captured with {} samples, which do not serve {count}",
+                        self.captured_samples
+                    ),
+                    "leave captured_samples out: 64 serve all counts",
+                ));
+            }
         }
         Ok(())
     }
@@ -400,6 +415,13 @@ mod tests {
     }
 
     #[test]
+    fn the_default_study_is_one() {
+        let study = Study::preset().unwrap();
+        assert_eq!(study.baseline, "enderton");
+        assert!(study.scenes.iter().all(|s| s.source.as_deref().unwrap().starts_with("builtin:")));
+    }
+
+    #[test]
     fn a_wrong_key_or_name_says_where_and_the_nearest() {
         assert_eq!(
             message("samples =", "sampels ="),
@@ -432,6 +454,7 @@ mod tests {
             ("[4, 8]", "[]", "'samples' is empty"),
             ("'engine'", "'a/b'", "is no name for a scene"),
             ("'engine'", "'..'", "is no name for a scene"),
+            ("name = 'engine'", "name = 'engine'\ncaptured_samples = 8", "do not serve 4"),
             ("source = 'builtin:engine'", "", "needs either a source or a trace"),
             ("name = 'a'", "name = 'a'\nseeds = 0", "'seeds' cannot be 0"),
             ("name = 'a'", "name = 'a'\nbaseline = 'slab'", "unknown design as a baseline"),

@@ -77,7 +77,8 @@ pub struct Promised {
     pub unbiased: bool,
     /// Its picture approaches the exact one as samples increase.
     pub consistent: bool,
-    /// The order in which fragments arrive does not matter, but for rounding.
+    /// The order in which fragments arrive does not change the expected picture, but for
+    /// rounding: nobody has to sort.
     pub any_order: bool,
     /// Its picture depends on the seed: it is noise, not structure.
     pub seeded: bool,

@@ -79,7 +79,7 @@ class Page:
     def settle(self):
         """Waits until pictures are decoded and drawn."""
         self.driver.execute_async_script("""
-            const done = arguments[0], section = document.getElementById('pictures');
+            const done = arguments[0], section = document.getElementById('viewer');
             const start = performance.now();
             const look = () => requestAnimationFrame(() => requestAnimationFrame(() => {
               if (section.dataset.ready === 'true' || performance.now() - start > 30000) done();
@@ -89,7 +89,7 @@ class Page:
 
     def state(self):
         self.settle()
-        return dict(self.script("return {...document.getElementById('pictures').dataset}"))
+        return dict(self.script("return {...document.getElementById('viewer').dataset}"))
 
     def canvases(self):
         return self.driver.find_elements(By.CSS_SELECTOR, ".viewer-frame canvas")
@@ -122,7 +122,7 @@ class Page:
         at = self.script("""
             const canvas = document.querySelector('.viewer-frame canvas');
             canvas.scrollIntoView({block: 'center', behavior: 'instant'});
-            const box = canvas.getBoundingClientRect(), d = document.getElementById('pictures').dataset;
+            const box = canvas.getBoundingClientRect(), d = document.getElementById('viewer').dataset;
             return [box.left + box.width / 2 + (arguments[0] + 0.5 - d.x) * d.scale,
                     box.top + box.height / 2 + (arguments[1] + 0.5 - d.y) * d.scale]""", x, y)
         self.pointer(*at)
@@ -135,7 +135,7 @@ class Page:
         """For each pixel: what the panels and the reference say there, and the colours that
         the first panel shows there."""
         return self.driver.execute_async_script("""
-            const [pixels, done] = arguments, section = document.getElementById('pictures');
+            const [pixels, done] = arguments, section = document.getElementById('viewer');
             const canvas = section.querySelector('.viewer-frame canvas');
             // Read from a canvas of our own: browsers warn of reading what is meant for the screen.
             const reader = document.createElement('canvas').getContext('2d', {willReadFrequently: true});
@@ -614,7 +614,7 @@ def self_test(report, folder):
 def screenshots(report, out):
     out.mkdir(parents=True, exist_ok=True)
 
-    def shot(page, name, selector="#pictures"):
+    def shot(page, name, selector="#viewer"):
         page.settle()
         page.driver.execute_async_script("setTimeout(arguments[0], 200)")
         box = page.script("""const b = document.querySelector(arguments[0]).getBoundingClientRect();

@@ -2,6 +2,7 @@
 
 mod gpu;
 mod outputs;
+mod study;
 mod words;
 
 use std::fs;

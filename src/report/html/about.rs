@@ -44,7 +44,7 @@ fn promises(told: Option<&[String]>, record: Option<&crate::study::record::Recor
             let list = [
                 (p.unbiased, "unbiased"),
                 (p.consistent, "consistent"),
-                (p.any_order, "independent of order"),
+                (p.any_order, "any order of fragments"),
                 (!p.seeded, "the same for every seed"),
             ];
             words.extend(list.iter().filter(|(holds, _)| *holds).map(|(_, w)| w.to_string()));

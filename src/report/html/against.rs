@@ -21,7 +21,7 @@ pub(super) fn central(content: &Content<'_>) -> Markup {
             fieldset class="filters" {
                 legend { "Show only designs that are" }
                 label { input type="checkbox" data-filter="unbiased"; " unbiased" }
-                label { input type="checkbox" data-filter="any-order"; " independent of order" }
+                label { input type="checkbox" data-filter="any-order"; " any order of fragments" }
                 label { input type="checkbox" data-filter="one-pass"; " done in one pass" }
             }
             (figure("central", &html! { (tabs("Cost", &panels)) (content.legend(|_| true)) }, &html! {

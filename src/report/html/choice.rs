@@ -4,11 +4,13 @@ use maud::{Markup, html};
 
 use crate::param::Options;
 use crate::report::html::against;
+use crate::report::html::page::Extras;
 use crate::report::html::parts::{Cell, Content, figure, name};
 use crate::report::html::words::{counted, estimated, figures, fixed, listed};
 use crate::study::analysis::{
     Answer, BUDGETS, Budget, Candidate, Need, RunName, Separation, answers, baseline, relative,
 };
+use crate::study::results::Results;
 
 pub(super) fn section(content: &Content<'_>) -> Markup {
     let answers = answers(content.results);
@@ -30,6 +32,12 @@ pub(super) fn section(content: &Content<'_>) -> Markup {
             (against::per_scene(content))
         }
     }
+}
+
+/// Which design to build, in sentences; names stand between backquotes.
+pub fn answer(results: &Results) -> Vec<String> {
+    let extras = Extras::default();
+    lead(&Content::new(results, &extras), &answers(results))
 }
 
 fn bytes(c: &Candidate<'_>) -> String {

@@ -17,5 +17,7 @@ mod tests;
 pub mod viewer;
 mod words;
 
+pub use choice::answer;
 pub use page::{DesignText, Extras, Place, Section, page};
+pub use parts::replay_command;
 pub use words::grouped;

@@ -58,8 +58,8 @@ pub struct Extras {
     pub designs: Vec<DesignText>,
     /// When the study was run.
     pub when: Option<String>,
-    /// The study file's path, for commands.
-    pub study_file: String,
+    /// The command that measures the study.
+    pub command: String,
     /// Style sheets of the sections.
     pub css: Vec<String>,
     /// Scripts of the sections.
@@ -72,7 +72,7 @@ impl Default for Extras {
             sections: Vec::new(),
             designs: Vec::new(),
             when: None,
-            study_file: "study.toml".to_string(),
+            command: "screendoor study study.toml -o results".to_string(),
             css: Vec::new(),
             js: Vec::new(),
         }

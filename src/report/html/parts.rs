@@ -52,24 +52,12 @@ impl<'a> Content<'a> {
 
     /// The command that measures the whole study.
     pub fn study_command(&self) -> Markup {
-        command(&format!("screendoor study {}", quoted(&self.extras.study_file)))
+        command(&self.extras.command)
     }
 
     /// The command that gives a run's errors and counts.
     pub fn replay(&self, record: &Record) -> String {
-        let trace = self.results.scenes.iter().find(|s| s.name == record.scene);
-        let trace = trace.map_or("TRACE", |s| s.trace.as_str());
-        let from = match self.results.study.first_seed {
-            0 => String::new(),
-            seed => format!(" --seed {seed}"),
-        };
-        format!(
-            "screendoor replay {} --design {} --samples {} --seeds {}{from} --exact",
-            quoted(trace),
-            quoted(&record.design),
-            record.samples,
-            record.seeds
-        )
+        replay_command(self.results, record, record.seeds)
     }
 
     /// [`Content::replay`] of the baseline on the first scene that has it, as a pattern for all others.
@@ -94,6 +82,24 @@ impl<'a> Content<'a> {
             }
         }
     }
+}
+
+/// The command that replays a run with its first `seeds` seeds and holds it against the
+/// exact picture. Traces are named as seen from the results' folder.
+pub fn replay_command(results: &Results, record: &Record, seeds: u32) -> String {
+    let trace = results.scenes.iter().find(|s| s.name == record.scene);
+    let trace = trace.map_or("TRACE", |s| s.trace.as_str());
+    let first = match results.study.first_seed {
+        0 => String::new(),
+        seed => format!(" --seed {seed}"),
+    };
+    let several = if seeds == 1 { String::new() } else { format!(" --seeds {seeds}") };
+    format!(
+        "screendoor replay {} --design {} --samples {}{several}{first} --exact",
+        quoted(trace),
+        quoted(&record.design),
+        record.samples,
+    )
 }
 
 /// A design's name, which may break where its parts do.

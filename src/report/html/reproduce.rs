@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use crate::report::html::parts::{Cell, Content, command, figure, nothing, table};
+use crate::report::html::parts::{Cell, Content, figure, nothing, table};
 use crate::report::html::words::{counted, fixed, grouped};
 use crate::study::record::Record;
 
@@ -90,6 +90,6 @@ pub(super) fn missing(content: &Content<'_>) -> Markup {
     html! {
         p { (counted(list.len(), "run")) " of the study without a result. No figure over scenes includes its design at its sample count." }
         (table(&["scene", "design", "samples", "why"], &rows))
-        (command(&format!("screendoor study {}", crate::report::html::words::quoted(&content.extras.study_file))))
+        (content.study_command())
     }
 }

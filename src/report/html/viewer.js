@@ -792,7 +792,7 @@ function viewer(section) {
 }
 
 function startViewer() {
-  const section = document.getElementById('pictures');
+  const section = document.getElementById('viewer');
   if (canInflate()) {
     viewer(section);
     return;

@@ -51,7 +51,7 @@ pub struct ViewedScene<'a> {
 /// `--fg`, `--muted`, `--line`, `--panel`, `--accent`, `--good` and `--bad`.
 pub const STYLE: &str = concat!(include_str!("viewer.css"), include_str!("inspector.css"));
 
-/// The script, which [`section`] holds: one function, so that no name of it is the
+/// The script, which [`element`] holds: one function, so that no name of it is the
 /// page's.
 const SCRIPT: &str = concat!(
     "(() => {\n'use strict';\n",
@@ -61,19 +61,17 @@ const SCRIPT: &str = concat!(
     "})();\n"
 );
 
-/// The section `pictures`: the viewer, the pixel inspector, their data and their
-/// script.
+/// The element `viewer`: the viewer, the pixel inspector, their data and their script.
 ///
 /// # Panics
 /// Where there is no scene or one has no pictures, and where a picture or a FLIP
 /// map has another size than the scene's reference.
-pub fn section(scenes: &[ViewedScene<'_>]) -> Markup {
+pub fn element(scenes: &[ViewedScene<'_>]) -> Markup {
     assert!(!scenes.is_empty() && scenes.iter().all(|s| !s.pictures.is_empty()));
     let mut blobs = Blobs::default();
     let data: Vec<Value> = scenes.iter().map(|scene| scene_data(scene, &mut blobs)).collect();
     html! {
-        section #pictures .viewer aria-labelledby="pictures-title" {
-            h2 #pictures-title { "Pictures" }
+        div #viewer .viewer role="group" aria-label="picture viewer" {
             noscript { p { "The picture viewer needs JavaScript." } }
             p.viewer-failure role="alert" hidden {}
             (controls(scenes))
@@ -260,7 +258,7 @@ mod tests {
             pixel: [3, 2],
             trace: "a.arrow".into(),
         };
-        let page = section(&[scene]).into_string();
+        let page = element(&[scene]).into_string();
         assert!(page.contains("a &amp; b · 8 samples"));
         assert!(!page.contains("lk</script>"), "data ended its element");
         // The reference, the picture, its FLIP map and its explanation.

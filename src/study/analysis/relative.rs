@@ -8,9 +8,10 @@ use crate::study::results::Results;
 /// The sample count at which designs are compared, where the study has it.
 const PREFERRED_COUNT: u32 = 8;
 
-/// An RMSE below this, in 8-bit units, is rounding. A mean of ratios takes it for this
-/// much: the logarithm of an accidental 1e-12 on one scene would drown all others.
-pub const ROUNDING: f64 = 1e-3;
+/// An RMSE below this, in 8-bit units, no 8-bit picture shows: 1/√12 is what rounding to
+/// 8 bits makes itself. A mean of ratios takes it for this much: the logarithm of an
+/// accidental 1e-12 on one scene would drown all others.
+pub const ROUNDING: f64 = 0.288_675_134_594_812_9;
 
 /// A design at a sample count.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -58,7 +58,8 @@ pub(super) fn measure(
         promises: Promised {
             unbiased: promises.unbiased,
             consistent: promises.consistent,
-            any_order: promises.order != OrderPromise::Dependent,
+            // What is unbiased has the exact picture as its mean, whatever the order.
+            any_order: promises.unbiased || promises.order != OrderPromise::Dependent,
             seeded: promises.seeded,
         },
         samples: job.samples,
@@ -80,6 +81,12 @@ pub(super) fn measure(
         picture: first.hash(),
         speed: run.speed(engines, &first),
     };
+    // What is not finite would be lost in the file, and no later run would know why.
+    let text = serde_json::to_string(&record).map_err(|e| e.to_string())?;
+    if serde_json::from_str::<Record>(&text).is_err() {
+        let pixels = first.not_finite();
+        return Err(format!("its errors are not finite; {pixels} pixels of its picture are not"));
+    }
     Ok((record, first))
 }
 

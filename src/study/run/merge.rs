@@ -81,9 +81,6 @@ fn bring(into: &Store, part: &Store) -> Result<()> {
     for (scene, _) in study.scenes.iter().enumerate() {
         copy(&part.scene_file(scene))?;
         copy(&part.folder().join(part.trace_name(scene)))?;
-        for samples in &study.pictures {
-            copy(&part.folder().join(part.reference_name(scene, *samples)))?;
-        }
     }
     let verification = part.folder().join("verification");
     for entry in fs::read_dir(&verification).into_iter().flatten().flatten() {

@@ -126,20 +126,24 @@ impl Runner<'_> {
         let (record, picture) =
             measure(study, engines, scene, reference, job, watch).map_err(Failure::Run)?;
         if study.pictures.contains(&job.samples) {
-            self.keep(job, scene, &picture)?;
+            self.keep(job, scene, &picture, &reference.picture)?;
         }
         self.finish(job, &record)
     }
 
-    /// Keeps what the report's viewer shows of a run.
+    /// Keeps what the report's viewer shows of a run: its picture in the layers that
+    /// `screendoor replay --exact` writes, and the scene's pixel.
     fn keep(
         &self,
         job: &Job,
         scene: &OpenScene,
         picture: &Picture,
+        reference: &Picture,
     ) -> std::result::Result<(), Failure> {
         let path = self.store.folder().join(Store::picture_name(&job.id));
-        write_exr(path, &[Layer { name: "colour", picture }])?;
+        let error = picture.minus(reference);
+        let layers = [("colour", picture), ("reference", reference), ("error", &error)];
+        write_exr(path, &layers.map(|(name, picture)| Layer { name, picture }))?;
         let study = self.store.study();
         let design = study.design(&job.series, job.samples)?;
         let [x, y] = scene.facts.pixel;

@@ -7,7 +7,7 @@ use crate::design::{REFERENCE, configure};
 use crate::error::{Error, Result};
 use crate::metrics::{Flip, PixelClasses, Region};
 use crate::output::OutputFile;
-use crate::picture::{Layer, Picture, write_exr};
+use crate::picture::Picture;
 use crate::rop::ReplayOptions;
 use crate::scene;
 use crate::study::file::{Metric, SceneEntry};
@@ -22,8 +22,6 @@ pub type Watch<'a> = &'a (dyn Fn(&str) + Sync);
 
 /// A scene that is being measured.
 pub(super) struct OpenScene {
-    /// Its place in the study.
-    pub index: usize,
     /// Its trace.
     pub trace: Trace,
     /// What is told of it.
@@ -62,7 +60,7 @@ impl OpenScene {
             ReplayOptions { memory: store.study().memory << 20, ..ReplayOptions::default() };
         let fine = configure(REFERENCE, &[])?.replay(&trace, all, 0, &options)?.picture;
         let fine_covered = PixelClasses::of(&trace, all)?.covered;
-        Ok(OpenScene { index, trace, facts, fine, fine_covered })
+        Ok(OpenScene { trace, facts, fine, fine_covered })
     }
 }
 
@@ -83,7 +81,7 @@ fn draw(entry: &SceneEntry, base: &Path, path: &Path) -> Result<()> {
     let place = path.display().to_string();
     let mut writer =
         TraceWriter::new(file, &place, capture.header().clone(), WriteOptions::default())?;
-    capture.draw(&mut writer, &mut |_, _| ())?;
+    capture.draw(&mut writer, |_, _| ())?;
     writer.finish()?.0.commit()
 }
 
@@ -131,30 +129,40 @@ fn facts(
 }
 
 /// Fragments in a pixel that are enough to see how a design works and few enough to read.
-const TELLING: u32 = 6;
+const TELLING: f64 = 6.0;
 
-/// Of the pixels whose number of fragments is nearest [`TELLING`] the one nearest the
-/// frame's centre.
+/// The pixel that tells most, the one nearest the frame's centre where several do: with
+/// [`TELLING`] fragments, all of which cover all samples. A fragment more or less counts as
+/// much as one that covers next to nothing.
 fn telling_pixel(trace: &Trace) -> Result<[u16; 2]> {
     let header = trace.header();
     let grid = TileGrid::new(header.width, header.height);
-    let mut counts: TileMap<Box<[u32; TILE_PIXELS]>> = TileMap::new(grid);
+    let all = f64::from(header.pattern.samples());
+    // Fragments, and how much of the pixel they leave uncovered.
+    let mut pixels: TileMap<Box<[(f64, f64); TILE_PIXELS]>> = TileMap::new(grid);
     for batch in trace.batches() {
         for f in batch?.iter() {
-            let tile =
-                counts.get_or_insert_with(grid.tile(f.x, f.y), || Box::new([0; TILE_PIXELS]));
-            let count = &mut tile[TileGrid::within(f.x, f.y)];
-            *count = count.saturating_add(1);
+            let tile = pixels
+                .get_or_insert_with(grid.tile(f.x, f.y), || Box::new([(0.0, 0.0); TILE_PIXELS]));
+            let (fragments, uncovered) = &mut tile[TileGrid::within(f.x, f.y)];
+            *fragments += 1.0;
+            *uncovered += 1.0 - f64::from(f.coverage.count()) / all;
         }
     }
     let centre = [header.width / 2, header.height / 2];
-    let mut best = (u32::MAX, u64::MAX, centre);
-    for (tile, counts) in counts.touched() {
-        for (within, count) in counts.iter().enumerate().filter(|(_, c)| **c > 0) {
+    let mut best = (f64::INFINITY, u64::MAX, centre);
+    for (tile, pixels) in pixels.touched() {
+        for (within, (fragments, uncovered)) in pixels.iter().enumerate() {
+            if *fragments == 0.0 {
+                continue;
+            }
             let (x, y) = grid.pixel(*tile, within);
             let square = |a: u32, b: u32| u64::from(a.abs_diff(b)).pow(2);
             let distance = square(x, centre[0]) + square(y, centre[1]);
-            best = best.min((count.abs_diff(TELLING), distance, [x, y]));
+            let lack = (fragments - TELLING).abs() + uncovered;
+            if (lack, distance, [x, y]) < best {
+                best = (lack, distance, [x, y]);
+            }
         }
     }
     Ok(best.2.map(|c| c as u16))
@@ -174,11 +182,10 @@ pub(super) struct Reference {
 }
 
 impl Reference {
-    /// Makes it, and keeps the picture where the study keeps pictures.
+    /// Makes it.
     ///
     /// # Errors
-    /// As [`crate::design::Configured::replay`]; [`Error::Io`] where the picture cannot
-    /// be written.
+    /// As [`crate::design::Configured::replay`].
     pub fn of(store: &Store, scene: &OpenScene, samples: u32) -> Result<Self> {
         let study = store.study();
         let trace = &scene.trace;
@@ -189,10 +196,6 @@ impl Reference {
             let options = ReplayOptions { memory: study.memory << 20, ..ReplayOptions::default() };
             configure(REFERENCE, &[])?.replay(trace, samples, 0, &options)?.picture
         };
-        if study.pictures.contains(&samples) {
-            let path = store.folder().join(store.reference_name(scene.index, samples));
-            write_exr(path, &[Layer { name: "colour", picture: &picture }])?;
-        }
         let seen = [Metric::Flip, Metric::FlipHdr].iter().any(|m| study.takes(*m));
         Ok(Reference {
             samples,

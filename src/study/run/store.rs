@@ -132,11 +132,6 @@ impl Store {
         format!("pictures/{id}.exr")
     }
 
-    /// The exact picture at a sample count, as seen from the folder.
-    pub fn reference_name(&self, scene: usize, samples: u32) -> String {
-        format!("pictures/{}.{samples}.exact.exr", self.study.scenes[scene].name)
-    }
-
     /// What a run does at the scene's pixel.
     pub fn explanation_file(&self, id: &str) -> PathBuf {
         self.folder.join("explain").join(format!("{id}.json"))

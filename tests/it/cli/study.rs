@@ -1,0 +1,255 @@
+//! Studies: interrupted, in parts, with what cannot be done.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use screendoor::random::Stream;
+use screendoor::study::record::Record;
+use serde_json::Value;
+
+use super::{PROGRAM, Workplace};
+
+const STUDY: &str = "
+name = 'small'
+designs = ['enderton', 'lk', 'kbuffer:layers={n}', 'blend']
+samples = [4, 8]
+seeds = 3
+timing = 0
+metrics = ['flip', 'spectrum', 'filtered']
+pictures = [8]
+[[scene]]
+name = 'glass'
+source = 'builtin:glass'
+size = [40, 33]
+[[scene]]
+name = 'ramps'
+source = 'builtin:ramps'
+size = [32, 32]
+captured_samples = 32
+";
+
+/// A folder with the study `s.toml`, changed by `change`.
+fn with_study(change: &[(&str, &str)]) -> Workplace {
+    let place = Workplace::new();
+    let mut text = STUDY.to_string();
+    for (from, to) in change {
+        assert!(text.contains(from), "{from}");
+        text = text.replace(from, to);
+    }
+    fs::write(place.path("s.toml"), text).unwrap();
+    place
+}
+
+/// What must be the same however a study came to its end.
+fn results(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut files = BTreeMap::new();
+    for kind in ["runs", "scenes", "traces", "pictures", "explain"] {
+        for entry in fs::read_dir(folder.join(kind)).unwrap() {
+            let entry = entry.unwrap();
+            let name = format!("{kind}/{}", entry.file_name().to_string_lossy());
+            files.insert(name, fs::read(entry.path()).unwrap());
+        }
+    }
+    for name in ["study.toml", "results.jsonl"] {
+        files.insert(name.to_string(), fs::read(folder.join(name)).unwrap());
+    }
+    files
+}
+
+#[test]
+fn killed_fifty_times_a_study_ends_with_the_same_results() {
+    let place = with_study(&[]);
+    place.good(&["study", "s.toml", "-o", "whole"]);
+    let whole = results(&place.path("whole"));
+    assert_eq!(whole.keys().filter(|k| k.starts_with("runs/")).count(), 16);
+    assert_eq!(whole.keys().filter(|k| k.starts_with("pictures/")).count(), 8);
+
+    let mut random = Stream::new([0x6b11, 50]);
+    let (mut kills, mut round, mut ended) = (0, 0, 0);
+    while kills < 50 {
+        let folder = place.path(&format!("killed-{round}"));
+        let mut child = Command::new(PROGRAM)
+            .args(["study", "s.toml", "-o", &format!("killed-{round}")])
+            .current_dir(place.0.path())
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(Duration::from_micros(u64::from(random.below(150_000))));
+        child.kill().unwrap();
+        if child.wait().unwrap().success() {
+            // It was done before.
+            ended += 1;
+            assert!(results(&folder) == whole, "round {round} differs");
+            round += 1;
+            continue;
+        }
+        kills += 1;
+        // What lies there under a good name is whole.
+        for entry in fs::read_dir(folder.join("runs")).into_iter().flatten().flatten() {
+            let name = entry.file_name().to_string_lossy().into_owned();
+            if !name.starts_with('.') {
+                let key = format!("runs/{name}");
+                assert!(whole[&key] == fs::read(entry.path()).unwrap(), "{key} differs");
+            }
+        }
+    }
+    let last = format!("killed-{round}");
+    place.good(&["study", "s.toml", "-o", &last]);
+    let mut last = results(&place.path(&last));
+    // Files under construction of programs that were killed outright stay.
+    last.retain(|name, _| !name.contains(".partial"));
+    assert!(last == whole, "the last round differs");
+    println!("50 kills, {ended} studies ended between them");
+}
+
+#[test]
+fn an_interrupted_study_with_times_differs_in_times_alone() {
+    let place = with_study(&[("timing = 0", "timing = 1")]);
+    place.good(&["study", "s.toml", "-o", "a"]);
+    place.good(&["study", "s.toml", "-o", "b", "--shard", "1/3"]);
+    place.good(&["study", "s.toml", "-o", "b"]);
+    let records = |folder: &str| -> Vec<Record> {
+        let text = fs::read_to_string(place.path(folder).join("results.jsonl")).unwrap();
+        text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    };
+    let (mut a, mut b) = (records("a"), records("b"));
+    for record in a.iter_mut().chain(&mut b) {
+        let fast = &record.speed["fast"];
+        assert!(fast.seconds.unwrap().median > 0.0 && fast.same_bits == Some(true));
+        record.speed.clear();
+    }
+    assert_eq!(a, b);
+}
+
+#[test]
+fn parts_make_the_whole() {
+    let place = with_study(&[]);
+    place.good(&["study", "s.toml", "-o", "whole"]);
+    for part in 1..=3 {
+        let (shard, folder) = (format!("{part}/3"), format!("p{part}"));
+        place.good(&["study", "s.toml", "-o", &folder, "--shard", &shard]);
+    }
+    let said = place.good(&["merge", "merged", "p1", "p3"]);
+    assert!(said.contains("11 of 16 runs"), "{said}");
+    place.good(&["merge", "merged", "p1", "p2", "p3"]);
+    assert!(results(&place.path("merged")) == results(&place.path("whole")));
+    // Once more changes nothing.
+    place.good(&["merge", "merged", "p2", "merged"]);
+    assert!(results(&place.path("merged")) == results(&place.path("whole")));
+    // The report can be written again from the folder alone.
+    fs::remove_file(place.path("merged/report.html")).unwrap();
+    place.good(&["report", "merged"]);
+    assert!(fs::read_to_string(place.path("merged/report.html")).unwrap().contains("kbuffer"));
+}
+
+#[test]
+fn parts_of_different_studies_or_traces_are_refused() {
+    let place = with_study(&[]);
+    place.good(&["study", "s.toml", "-o", "a", "--shard", "1/2"]);
+    let other = STUDY.replace("seeds = 3", "seeds = 2");
+    fs::write(place.path("t.toml"), other).unwrap();
+    place.good(&["study", "t.toml", "-o", "b", "--shard", "2/2"]);
+    let (code, error) = place.bad(&["merge", "m", "a", "b"]);
+    assert!(code == 2 && error.contains("parts of different studies"), "{error}");
+
+    place.good(&["study", "s.toml", "-o", "c", "--shard", "1/2"]);
+    let scene = place.path("c/scenes/glass.json");
+    let mut facts: Value = serde_json::from_slice(&fs::read(&scene).unwrap()).unwrap();
+    facts["content"] = "0".repeat(64).into();
+    fs::write(&scene, facts.to_string()).unwrap();
+    let (code, error) = place.bad(&["merge", "m2", "a", "c"]);
+    assert!(code == 1 && error.contains("different traces of scene 'glass'"), "{error}");
+
+    // Errors that differ: two versions of the program, say.
+    place.good(&["study", "s.toml", "-o", "d", "--shard", "1/2"]);
+    let run = place.path("d/runs/glass.4.lk.json");
+    let mut record: Value = serde_json::from_slice(&fs::read(&run).unwrap()).unwrap();
+    record["covered"]["rmse"]["value"] = 1.0.into();
+    fs::write(&run, record.to_string()).unwrap();
+    let (code, error) = place.bad(&["merge", "m3", "a", "d"]);
+    assert!(code == 1 && error.contains("different errors for one run"), "{error}");
+}
+
+#[test]
+fn a_folder_is_one_study_and_nothing_else_is_overwritten() {
+    let place = with_study(&[]);
+    place.good(&["study", "s.toml", "-o", "out", "--shard", "1/16"]);
+    fs::write(place.path("t.toml"), STUDY.replace("'blend'", "'wboit'")).unwrap();
+    let (code, error) = place.bad(&["study", "t.toml", "-o", "out"]);
+    assert!(code == 2 && error.contains("holds another study"), "{error}");
+
+    fs::create_dir(place.path("mine")).unwrap();
+    fs::write(place.path("mine/report.html"), "mine").unwrap();
+    let (code, error) = place.bad(&["study", "s.toml", "-o", "mine"]);
+    assert!(code == 2 && error.contains("is not empty and holds no study"), "{error}");
+    assert_eq!(fs::read_to_string(place.path("mine/report.html")).unwrap(), "mine");
+
+    let lock = fs::File::options().write(true).open(place.path("out/.lock")).unwrap();
+    lock.lock().unwrap();
+    let (code, error) = place.bad(&["study", "s.toml", "-o", "out"]);
+    assert!(code == 2 && error.contains("at work in out"), "{error}");
+    lock.unlock().unwrap();
+
+    // A damaged result is told, not taken and not overwritten.
+    fs::write(place.path("out/runs/glass.4.enderton.json"), "{").unwrap();
+    let (code, error) = place.bad(&["study", "s.toml", "-o", "out"]);
+    assert!(code == 1 && error.contains("remove it to have it measured again"), "{error}");
+    let (code, error) = place.bad(&["report", "nowhere"]);
+    assert!(code == 1 && error.contains("no study has been measured there"), "{error}");
+}
+
+#[test]
+fn what_cannot_be_done_is_missing_and_the_rest_goes_on() {
+    let scene = "[[scene]]\nname = 'ramps'";
+    let trace = "[[scene]]\nname = 'few'\ntrace = 'few.arrow'\n[[scene]]\nname = 'ramps'";
+    let gone = "[[scene]]\nname = 'gone'\nsource = 'no.glb'\n";
+    let place = with_study(&[(scene, &format!("{gone}{trace}"))]);
+    place.good(&[
+        "capture",
+        "builtin:glass",
+        "-o",
+        "few.arrow",
+        "--size",
+        "16x16",
+        "--samples",
+        "4",
+    ]);
+    let (code, error) = place.bad(&["study", "s.toml", "-o", "out"]);
+    assert!(code == 1 && error.contains("gone.4.enderton and 7 more runs could not"), "{error}");
+    assert!(error.contains("few.8.enderton and 3 more runs"), "{error}");
+    assert_eq!(error.lines().count(), 2, "{error}");
+    let text = fs::read_to_string(place.path("out/results.jsonl")).unwrap();
+    assert_eq!(text.lines().count(), 20);
+    assert!(!text.contains("\"gone\""));
+    let page = fs::read_to_string(place.path("out/report.html")).unwrap();
+    assert!(page.contains("few.8.lk") && page.contains("gone.4.blend") && page.contains("no.glb"));
+
+    // Once it can be done it is.
+    place.good(&["capture", "builtin:glass", "-o", "few.arrow", "--size", "16x16"]);
+    let (code, error) = place.bad(&["study", "s.toml", "-o", "out"]);
+    assert!(code == 1 && error.contains("was another one when the study was begun"), "{error}");
+}
+
+#[test]
+fn a_wrong_study_file_is_one_line_of_error() {
+    for (from, to, says) in [
+        ("seeds = 3", "sedes = 3", "did you mean 'seeds'?"),
+        ("'lk'", "'lk:srot=false'", "did you mean 'sort'?"),
+        ("builtin:glass'\nsize", "builtin:glass'\nsizes", "did you mean 'size'?"),
+        ("samples = [4, 8]", "samples = [4, 7]", "'samples' cannot be 7"),
+        ("name = 'small'", "name = 'small", "line 2"),
+    ] {
+        let place = with_study(&[(from, to)]);
+        let (code, error) = place.bad(&["study", "s.toml", "-o", "out"]);
+        assert!(code == 2 && error.contains(says) && error.contains("s.toml"), "{error}");
+        assert_eq!(error.lines().count(), 1, "{error}");
+        assert!(!place.path("out").exists());
+    }
+    let place = Workplace::new();
+    let (code, error) = place.bad(&["study", "none.toml", "-o", "out"]);
+    assert!(code == 1 && error.contains("none.toml"), "{error}");
+}
