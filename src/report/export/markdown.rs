@@ -14,16 +14,14 @@ pub fn markdown(results: &Results) -> String {
     let study = &results.study;
     let mut text = format!("# {}\n", escaped(&study.name));
     paragraph(&mut text, study.description.trim());
-    paragraph(
-        &mut text,
-        &format!(
-            "{} from {}, where a seed changes anything. Errors are over the covered pixels, against the exact \
-         picture of the same samples, on linear values in units of 1/255, ± half of the 95 % interval. \
-         Everything but times is the same on every machine.",
-            counted(study.seeds as usize, "seed"),
-            study.first_seed
-        ),
+    let how = format!(
+        "{} from {}, where a seed changes anything. Errors are over the covered pixels, against \
+         the exact picture of the same samples, on linear values in units of 1/255, ± half of \
+         the 95 % interval. Everything but times is the same on every machine.",
+        counted(study.seeds as usize, "seed"),
+        study.first_seed
     );
+    paragraph(&mut text, &how);
     for scene in &study.scenes {
         for samples in &study.samples {
             let heading = format!("{}, {}", scene.name, counted(*samples as usize, "sample"));
@@ -46,8 +44,11 @@ fn paragraph(text: &mut String, paragraph: &str) {
     }
 }
 
+/// A column's cell for a record; `None` where it has no figure.
+type Figure = fn(&Record) -> Option<String>;
+
 /// The columns between the design and the times.
-const COLUMNS: &[(&str, fn(&Record) -> Option<String>)] = &[
+const COLUMNS: &[(&str, Figure)] = &[
     ("RMSE", |r| with_error(r.covered.rmse)),
     ("bias", |r| r.bias().map(figures)),
     ("FLIP", |r| with_error(r.flip?.mean)),

@@ -44,7 +44,6 @@ fn json_lines_read_back_as_the_records() {
     unknown.edges.rmse = exactly(f64::NAN);
     let read: Record = serde_json::from_slice(&json_lines(&[unknown])).unwrap();
     assert!(read.edges.rmse.value.is_nan());
-    assert!(json_lines(&[]).is_empty());
 }
 
 fn rows(csv: &[u8]) -> Vec<BTreeMap<String, String>> {
@@ -75,7 +74,6 @@ fn csv_has_every_value_and_no_other() {
         assert_eq!(row["state_bytes"], absent(r.state_bytes()));
         assert_eq!(row["bias"], absent(r.bias()));
     }
-    assert!(csv(&[]).is_empty());
 }
 
 #[test]
@@ -127,11 +125,13 @@ fn arrow_has_the_same_columns_typed() {
             assert_eq!(&cell(array, column.kind, row), expected, "{} {row}", column.name);
         }
     }
-    assert!(batch_of_none().is_none());
 }
 
-fn batch_of_none() -> Option<RecordBatch> {
-    batch(arrow(&[]))
+#[test]
+fn without_records_there_are_no_columns() {
+    assert!(batch(arrow(&[])).is_none());
+    assert!(csv(&[]).is_empty());
+    assert!(json_lines(&[]).is_empty());
 }
 
 const DOCUMENT: &str = include_str!("../../../docs/STUDIES.md");
@@ -245,8 +245,11 @@ fn every_key_of_a_study_is_documented_with_its_default() {
 }
 
 #[test]
-fn the_documents_study_is_one() {
+fn studies_that_are_shown_are_some() {
     let example = DOCUMENT.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
     let study = Study::parse(example, "STUDIES.md").unwrap();
     assert_eq!((study.scenes.len(), study.seeds), (2, 16));
+    let small = include_str!("../../../workflow/small.toml");
+    let small = Study::parse(small, "small.toml").unwrap();
+    assert!(small.scenes.iter().all(|s| s.size == [64, 64]));
 }
