@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::metrics::{Estimate, Flip, FlipMap};
 use crate::output::OutputFile;
 use crate::picture::{Picture, read};
+use crate::report::export;
 use crate::report::html::viewer::{self, ViewedPicture, ViewedScene};
 use crate::report::html::{DesignText, Extras, Place, Section, page, replay_command};
 use crate::study::record::Record;
@@ -35,7 +36,10 @@ pub struct About {
 pub fn write_report(store: &Store, about: About) -> Result<Results> {
     let results = store.results()?;
     let put = |name: &str, bytes: &[u8]| OutputFile::put(store.folder().join(name), bytes);
-    put("results.jsonl", &json_lines(&results.records))?;
+    put("results.jsonl", &export::json_lines(&results.records))?;
+    put("results.csv", &export::csv(&results.records))?;
+    put("results.arrow", &export::arrow(&results.records))?;
+    put("results.md", export::markdown(&results).as_bytes())?;
     let pictures = Pictures::of(store, &results)?;
     let mut extras = Extras {
         designs: about.designs,
@@ -47,15 +51,6 @@ pub fn write_report(store: &Store, about: About) -> Result<Results> {
     extras.css.push(viewer::STYLE.to_string());
     put(PAGE, page(&results, &extras).as_bytes())?;
     Ok(results)
-}
-
-fn json_lines(records: &[Record]) -> Vec<u8> {
-    let mut bytes = Vec::new();
-    for record in records {
-        bytes.extend(serde_json::to_vec(record).unwrap_or_default());
-        bytes.push(b'\n');
-    }
-    bytes
 }
 
 /// When the last run was finished, as the file system has it.

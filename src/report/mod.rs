@@ -1,6 +1,7 @@
 //! Measured records as documents and pictures. Knows nothing of how runs are made.
 
 pub mod chart;
+pub mod export;
 mod folder;
 pub mod html;
 mod montage;

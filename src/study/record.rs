@@ -139,8 +139,10 @@ impl Record {
         (!self.state_bits.unbounded).then(|| f64::from(self.state_bits.total()) / 8.0)
     }
 
+    /// `None` where nothing was counted: a design that draws counts its fragments.
     fn per_fragment(&self, count: f64) -> Option<f64> {
-        (self.fragments > 0).then(|| count / self.fragments as f64)
+        let counted = self.fragments > 0 && self.events.fragments > 0;
+        counted.then(|| count / self.fragments as f64)
     }
 
     /// Bytes of pixel state read and written for each fragment of the trace, over all passes.

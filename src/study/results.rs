@@ -82,7 +82,44 @@ pub struct Missing {
     pub why: Option<String>,
 }
 
+impl Machine {
+    /// What is known of it, for people: what it is, and how much or which.
+    pub fn facts(&self) -> Vec<(&'static str, String)> {
+        let gib = |bytes: u64| format!("{:.0} GiB", bytes as f64 / (1_u64 << 30) as f64);
+        let facts = [
+            ("screendoor", self.screendoor.clone()),
+            ("Processor", self.processor.clone()),
+            ("Threads", self.threads.to_string()),
+            ("Memory", self.memory.map(gib).unwrap_or_default()),
+            ("System", self.system.clone()),
+            ("Vector instructions", self.vectors.clone()),
+            ("GPU", self.gpu.clone().unwrap_or_default()),
+        ];
+        facts.into_iter().filter(|(_, value)| !value.is_empty()).collect()
+    }
+}
+
+impl Missing {
+    /// Why there is no result, in words.
+    pub fn reason(&self) -> &str {
+        self.why.as_deref().unwrap_or("not run yet")
+    }
+}
+
 impl Results {
+    /// The names of the engines of the study and of its records, those of the study first.
+    pub fn engines(&self) -> Vec<String> {
+        let of_study = self.study.engines.iter().map(|e| e.name().to_string());
+        let of_records = self.records.iter().flat_map(|r| r.speed.keys().cloned());
+        let mut list: Vec<String> = Vec::new();
+        for engine in of_study.chain(of_records) {
+            if !list.contains(&engine) {
+                list.push(engine);
+            }
+        }
+        list
+    }
+
     /// The record of a design at a sample count on a scene.
     pub fn record(&self, scene: &str, series: &str, samples: u32) -> Option<&Record> {
         let wanted = |r: &&Record| r.scene == scene && r.series == series && r.samples == samples;

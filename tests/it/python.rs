@@ -1,17 +1,19 @@
-//! The Python of `docs/TRACE_FORMAT.md` does what the document says, and FLIP is what its
-//! authors' Python package makes of the same pictures.
+//! The Python of `docs/TRACE_FORMAT.md` and `docs/STUDIES.md` does what the documents say, and
+//! FLIP is what its authors' Python package makes of the same pictures.
 
 use std::path::Path;
 use std::process::Command;
 
 use screendoor::metrics::{Flip, FlipMap};
 use screendoor::picture::Picture;
+use screendoor::report::export::{arrow, json_lines};
+use screendoor::study::record::Record;
 use screendoor::trace::{Trace, statistics};
 
 use crate::util::{design, header, picture, random_fragments, trace_bytes};
 
-fn document() -> String {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/TRACE_FORMAT.md");
+fn document(name: &str) -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs").join(name);
     std::fs::read_to_string(path).unwrap()
 }
 
@@ -29,14 +31,15 @@ fn run(folder: &Path, program: &str) -> String {
 
 #[test]
 fn the_document_shows_writing_and_reading() {
-    assert_eq!(python_blocks(&document()).len(), 2);
+    assert_eq!(python_blocks(&document("TRACE_FORMAT.md")).len(), 2);
+    assert_eq!(python_blocks(&document("STUDIES.md")).len(), 1);
 }
 
 #[test]
 #[ignore = "needs python3 with pyarrow and numpy (SCREENDOOR_PYTHON names another interpreter)"]
 fn pyarrow_writes_and_reads_traces() {
     let folder = tempfile::tempdir().unwrap();
-    let blocks = python_blocks(&document());
+    let blocks = python_blocks(&document("TRACE_FORMAT.md"));
     run(folder.path(), &blocks[0]);
     let path = folder.path().join("layers.arrow");
     let trace = Trace::open(&path).unwrap();
@@ -65,6 +68,81 @@ fn pyarrow_writes_and_reads_traces() {
     assert!(said.contains("test 500 fragments"), "{said}");
     let found: f64 = said.rsplit(' ').next().unwrap().trim().parse().unwrap();
     assert!((found - mean).abs() < 1e-9, "{said}");
+}
+
+/// A record as a file of results has it.
+fn record(design: &str, rmse: f64) -> Record {
+    let e = serde_json::json!({"value": rmse, "low": null, "high": rmse * 1.1});
+    let region = serde_json::json!({
+        "seeds": 8, "pixels": 900, "rmse": e, "rmse_srgb": e, "mean": e, "max": 77.25,
+        "variance": 1e-300, "bias_squared": null, "temporal": null,
+    });
+    let record = serde_json::json!({
+        "id": format!("glass.8.{design}"), "scene": "glass", "trace": "é|,\"\n", "series": design,
+        "design": design, "family": "stochastic", "samples": 8, "seeds": 8,
+        "promises": {"unbiased": true, "consistent": true, "any_order": true, "seeded": false},
+        "fragments": (1_u64 << 53) + 1, "frame": region, "covered": region, "interior": region,
+        "edges": region, "fine": e, "filtered": [{"sigma": 1.0, "rmse": e}], "flip": null,
+        "flip_hdr": {"mean": e, "quartiles": [e, e, e]},
+        "spectrum": {"frequency": [0.25, 0.5], "power": [0.1, rmse], "blueness": null},
+        "events": {
+            "fragments": 5, "samples_tested": 6, "samples_passed": 7, "samples_written": 8,
+            "hashes": u64::MAX, "sorts_by_length": [0, 0, 3], "surfaces": 9,
+            "state_bits_read": 10, "state_bits_written": 11,
+        },
+        "state_bits": {"samples": 512, "extra": 42, "unbounded": false}, "passes": 1,
+        "touched_tiles": 12, "picture": "0", "speed": {"fast": {
+            "seconds": {"low": 0.1, "median": 0.2, "high": 0.3}, "kernel": null,
+            "same_bits": true, "missing": null,
+        }},
+    });
+    serde_json::from_value(record).unwrap()
+}
+
+/// Holds each column of `results.arrow` to the same place in `results.jsonl`, and each place
+/// there to a column.
+const RESULTS: &str = r#"
+import json, pyarrow as pa, pyarrow.ipc as ipc
+table = ipc.open_file("results.arrow").read_all()
+records = [json.loads(line) for line in open("results.jsonl", encoding="utf-8")]
+types = {bool: pa.bool_(), int: pa.uint64(), float: pa.float64(), str: pa.string(),
+         list: pa.list_(pa.float64())}
+def leaves(value, name=""):
+    nested = isinstance(value, list) and any(isinstance(v, dict) for v in value)
+    if isinstance(value, dict) or nested:
+        for key, v in value.items() if isinstance(value, dict) else enumerate(value):
+            yield from leaves(v, f"{name}.{key}" if name else str(key))
+    else:
+        yield name, value
+rows, seen = table.to_pylist(), 0
+assert len(rows) == len(records)
+for row, record in zip(rows, records):
+    own = {name: value for name, value in leaves(record) if value not in (None, [])}
+    for name, value in own.items():
+        assert row[name] == value, (name, row[name], value)
+        assert table.schema.field(name).type == types[type(value)], name
+        seen += 1
+    derived = {name for name, value in row.items() if value is not None} - set(own)
+    assert derived == set("""state_bytes bytes_moved_per_fragment hashes_per_fragment
+        comparators_per_fragment bias nanoseconds_per_fragment.fast.low
+        nanoseconds_per_fragment.fast.median nanoseconds_per_fragment.fast.high""".split()), derived
+print(seen)
+"#;
+
+#[test]
+#[ignore = "needs python3 with pyarrow (SCREENDOOR_PYTHON names another interpreter)"]
+fn pyarrow_reads_results() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut records = [record("lk", 0.1 + 0.2), record("kbuffer:layers=8", 7.0)];
+    records[1].filtered.clear();
+    records[1].spectrum = None;
+    std::fs::write(folder.path().join("results.arrow"), arrow(&records)).unwrap();
+    std::fs::write(folder.path().join("results.jsonl"), json_lines(&records)).unwrap();
+    let seen: usize = run(folder.path(), RESULTS).trim().parse().unwrap();
+    assert!(seen > 150, "{seen}");
+    let said = run(folder.path(), &python_blocks(&document("STUDIES.md"))[0]);
+    assert_eq!(said.lines().count(), 2, "{said}");
+    assert!(said.contains("'covered.rmse.value': 0.30000000000000004"), "{said}");
 }
 
 /// Reads two pictures, writes the map of FLIP's own evaluator.

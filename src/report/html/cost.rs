@@ -9,7 +9,7 @@ use crate::study::record::Record;
 
 pub(super) fn section(content: &Content<'_>) -> Markup {
     let count = content.count;
-    let engines = engines(content);
+    let engines = content.results.engines();
     html! {
         h3 { "Fragments per second at " (count) " samples" }
         @if content.results.records.iter().all(|r| r.speed.values().all(|s| s.seconds.is_none())) {
@@ -37,19 +37,6 @@ pub(super) fn section(content: &Content<'_>) -> Markup {
 }
 
 const CLASSES: [&str; 3] = ["a", "b", "c"];
-
-/// The engines of the study and of its records, those of the study first.
-fn engines(content: &Content<'_>) -> Vec<String> {
-    let of_study = content.results.study.engines.iter().map(|e| e.name().to_string());
-    let of_records = content.results.records.iter().flat_map(|r| r.speed.keys().cloned());
-    let mut list: Vec<String> = Vec::new();
-    for engine in of_study.chain(of_records) {
-        if !list.contains(&engine) {
-            list.push(engine);
-        }
-    }
-    list
-}
 
 /// The command that times all designs on the first scene.
 fn throughput(content: &Content<'_>, engines: &[String]) -> Markup {

@@ -15,7 +15,7 @@ mod reproduce;
 #[cfg(test)]
 mod tests;
 pub mod viewer;
-mod words;
+pub(in crate::report) mod words;
 
 pub use choice::answer;
 pub use page::{DesignText, Extras, Place, Section, page};

@@ -3,28 +3,13 @@
 use maud::{Markup, html};
 
 use crate::report::html::parts::{Cell, Content, figure, nothing, table};
-use crate::report::html::words::{counted, fixed, grouped};
+use crate::report::html::words::{counted, grouped};
 use crate::study::record::Record;
 
 pub(super) fn section(content: &Content<'_>) -> Markup {
-    let m = &content.results.machine;
-    let memory = m.memory.map(|bytes| format!("{} GiB", fixed(bytes as f64 / (1 << 30) as f64, 0)));
-    let facts = [
-        ("screendoor", Some(m.screendoor.clone())),
-        ("Processor", Some(m.processor.clone())),
-        ("Threads", Some(m.threads.to_string())),
-        ("Memory", memory),
-        ("System", Some(m.system.clone())),
-        ("Vector instructions", Some(m.vectors.clone())),
-        ("GPU", m.gpu.clone()),
-    ];
     html! {
         dl class="plain" {
-            @for (name, value) in &facts {
-                @if let Some(value) = value.as_ref().filter(|v| !v.is_empty()) {
-                    dt { (name) } dd { (value) }
-                }
-            }
+            @for (name, value) in content.results.machine.facts() { dt { (name) } dd { (value) } }
         }
         p class="prose" {
             "Everything but times is a pure function of the study: measured again, on whatever machine, it \
@@ -83,7 +68,7 @@ pub(super) fn missing(content: &Content<'_>) -> Markup {
             Cell::text(&m.scene),
             Cell::Text(content.named(&m.series)),
             Cell::Number(f64::from(m.samples), m.samples.to_string()),
-            Cell::text(m.why.as_deref().unwrap_or("not run yet")),
+            Cell::text(m.reason()),
         ]
     };
     let rows: Vec<_> = list.iter().map(row).collect();

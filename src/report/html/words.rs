@@ -16,7 +16,7 @@ pub fn grouped(n: u64) -> String {
 }
 
 /// A number with this many decimals and a proper minus.
-pub(super) fn fixed(v: f64, decimals: usize) -> String {
+pub(in crate::report) fn fixed(v: f64, decimals: usize) -> String {
     let text = format!("{v:.decimals$}");
     // What rounds to nothing has no sign.
     let zero = text.chars().all(|c| "-0.".contains(c));
@@ -25,7 +25,7 @@ pub(super) fn fixed(v: f64, decimals: usize) -> String {
 }
 
 /// A number with three digits that count.
-pub(super) fn figures(v: f64) -> String {
+pub(in crate::report) fn figures(v: f64) -> String {
     if v == 0.0 || !v.is_finite() {
         return if v.is_infinite() { "∞".into() } else { fixed(v, 0) };
     }
@@ -56,7 +56,7 @@ fn decimals_of(v: f64) -> usize {
 }
 
 /// What is said of how many there are: `1 scene`, `3 scenes`.
-pub(super) fn counted(n: usize, one: &str) -> String {
+pub(in crate::report) fn counted(n: usize, one: &str) -> String {
     if n == 1 { format!("1 {one}") } else { format!("{n} {one}s") }
 }
 
