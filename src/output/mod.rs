@@ -7,7 +7,7 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-pub use partial::abandon_all;
+pub use partial::{abandon_all, is_partial};
 pub use place::same_file;
 
 use crate::error::{Error, Result};

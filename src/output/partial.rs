@@ -8,6 +8,15 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::TempPath;
 
+const PREFIX: &str = ".screendoor-";
+const SUFFIX: &str = ".partial";
+
+/// Whether a path is named as a file under construction is.
+pub fn is_partial(path: &Path) -> bool {
+    let name = path.file_name().and_then(|n| n.to_str()).unwrap_or("");
+    name.starts_with(PREFIX) && name.ends_with(SUFFIX)
+}
+
 static PARTIAL: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 fn known() -> MutexGuard<'static, Vec<PathBuf>> {
@@ -36,7 +45,7 @@ impl Partial {
     /// Begins a file in `folder`.
     pub fn create(folder: &Path) -> io::Result<(File, Partial)> {
         let mut builder = tempfile::Builder::new();
-        builder.prefix(".screendoor-").suffix(".partial");
+        builder.prefix(PREFIX).suffix(SUFFIX);
         #[cfg(unix)]
         {
             use std::os::unix::fs::PermissionsExt;

@@ -8,7 +8,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::error::{Error, Result};
-use crate::output::OutputFile;
+use crate::output::{OutputFile, is_partial};
 use crate::param::Options;
 use crate::study::file::{Publication, Study, read_text};
 use crate::study::record::Record;
@@ -67,7 +67,11 @@ impl Store {
             Err(e) => return Err(Error::io("read", &path, e)),
         }
         let lock = lock(folder)?;
-        FOLDERS.iter().try_for_each(|name| create(&folder.join(name)))?;
+        remove_partial(folder);
+        for name in FOLDERS {
+            create(&folder.join(name))?;
+            remove_partial(&folder.join(name));
+        }
         if !path.exists() {
             OutputFile::put(&path, study_text(study).as_bytes())?;
         }
@@ -253,6 +257,16 @@ fn study_text(study: &Study) -> String {
         env!("CARGO_PKG_VERSION"),
         study.to_toml()
     )
+}
+
+/// Removes what a program that was killed outright had begun to write.
+fn remove_partial(folder: &Path) {
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        if is_partial(&entry.path()) {
+            // What cannot be removed is in nobody's way.
+            let _ = fs::remove_file(entry.path());
+        }
+    }
 }
 
 fn lock(folder: &Path) -> Result<File> {
