@@ -203,14 +203,35 @@ pub struct Comparison {
     /// On what.
     pub scenes: Vec<ComparedScene>,
     /// The same scenes with all samples at the pixels' centres, as Enderton et al. and
-    /// Wyman show theirs; with the designs of [`SLAB_CLAIM`] alone.
+    /// Wyman show theirs; with what [`SLAB_CLAIM`] is about alone.
     pub without_antialiasing: Vec<ComparedScene>,
     /// Models that were not given.
     pub missing: Vec<&'static str>,
 }
 
-/// The designs that Wyman's claim is about.
-pub const SLAB_CLAIM: [&str; 3] = ["slab", "enderton", "kbuffer"];
+/// What Wyman's claim is about: SLAB with each normalisation, and stochastic transparency
+/// with the same.
+pub const SLAB_CLAIM: [[&str; 2]; 5] = [
+    ["slab", "enderton:method=depth-correction"],
+    ["slab:opacity=discrete", "enderton:method=depth-correction"],
+    ["slab:normalise=none", "enderton"],
+    ["slab:normalise=alpha", "enderton:method=alpha-correction"],
+    ["slab:normalise=depth", "enderton:method=depth"],
+];
+/// Layers of `slab` in Wyman's claim.
+pub const SLAB_LAYERS: u32 = 8;
+/// Samples of stochastic transparency that it is held against there.
+pub const SLAB_RIVALS: [u32; 3] = [8, 16, 32];
+/// What `slab` becomes with ever more bits.
+pub const SLAB_LIMIT: &str = "kbuffer";
+
+/// Whether Wyman's claim is about a contender at a count.
+fn claimed(contender: &Contender, count: u32) -> bool {
+    let label = contender.label.as_str();
+    let layered = label == SLAB_LIMIT || SLAB_CLAIM.iter().any(|[slab, _]| *slab == label);
+    let rival = SLAB_CLAIM.iter().any(|[_, rival]| *rival == label);
+    layered && count == SLAB_LAYERS || rival && SLAB_RIVALS.contains(&count)
+}
 
 /// Compares all designs on the models in a folder, or on built-in scenes where no
 /// folder is given.
@@ -221,6 +242,29 @@ pub fn compare(
     models: Option<&Path>,
     side: u32,
     seeds: u32,
+    progress: impl FnMut(&str, u64, u64),
+) -> Result<Comparison> {
+    compare_some(models, side, seeds, |_, _| true, progress)
+}
+
+/// As [`compare`], but only what [`SLAB_CLAIM`] is about.
+///
+/// # Errors
+/// As [`compare`].
+pub fn compare_slab(
+    models: Option<&Path>,
+    side: u32,
+    seeds: u32,
+    progress: impl FnMut(&str, u64, u64),
+) -> Result<Comparison> {
+    compare_some(models, side, seeds, claimed, progress)
+}
+
+fn compare_some(
+    models: Option<&Path>,
+    side: u32,
+    seeds: u32,
+    wanted: fn(&Contender, u32) -> bool,
     mut progress: impl FnMut(&str, u64, u64),
 ) -> Result<Comparison> {
     let contenders = contenders();
@@ -235,8 +279,7 @@ pub fn compare(
         };
         let before = (i * contenders.len()) as u64;
         let watch = |done: usize| progress(spec.name, before + done as u64, total);
-        scenes.push(compared(spec.name, &trace, &contenders, |_| true, seeds, watch)?);
-        let claimed = |c: &Contender| SLAB_CLAIM.contains(&c.name);
+        scenes.push(compared(spec.name, &trace, &contenders, wanted, seeds, watch)?);
         if let Some(trace) = spec.capture(models, side, PatternKind::Centre)? {
             let compared = compared(spec.name, &trace, &contenders, claimed, seeds, |_| ())?;
             without_antialiasing.push(compared);
@@ -283,7 +326,7 @@ fn compared(
     name: &'static str,
     trace: &Trace,
     contenders: &[Contender],
-    takes_part: impl Fn(&Contender) -> bool,
+    wanted: fn(&Contender, u32) -> bool,
     seeds: u32,
     mut progress: impl FnMut(usize),
 ) -> Result<ComparedScene> {
@@ -292,14 +335,14 @@ fn compared(
     let options = ReplayOptions { memory: 1 << 30, ..ReplayOptions::default() };
     let exact = configure(REFERENCE, &[])?;
     let mut references = Vec::new();
-    for count in COUNTS {
+    for count in COUNTS.into_iter().filter(|n| contenders.iter().any(|c| wanted(c, *n))) {
         let reference = exact.replay(trace, count, 0, &options)?.picture;
         references.push((count, reference, PixelClasses::of(trace, count)?.covered));
     }
     let mut results = Vec::new();
-    for (contender, spec) in contenders.iter().enumerate().filter(|(_, c)| takes_part(c)) {
+    for (contender, spec) in contenders.iter().enumerate() {
         progress(contender);
-        for (count, reference, covered) in &references {
+        for (count, reference, covered) in references.iter().filter(|(n, ..)| wanted(spec, *n)) {
             let design = spec.at(*count, has_opaque)?;
             let seeds = if design.promises().seeded { seeds } else { 1 };
             let mut ensemble = Ensemble::new(reference, &[covered]);
@@ -372,6 +415,21 @@ impl Comparison {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_claim_is_about_contenders_that_there_are() {
+        let list = contenders();
+        let counts = |label: &str| {
+            let found = list.iter().find(|c| c.label == label).expect(label);
+            COUNTS.into_iter().filter(|n| claimed(found, *n)).collect::<Vec<_>>()
+        };
+        for [slab, rival] in SLAB_CLAIM {
+            assert_eq!(counts(slab), [SLAB_LAYERS]);
+            assert_eq!(counts(rival), SLAB_RIVALS);
+        }
+        assert_eq!(counts(SLAB_LIMIT), [SLAB_LAYERS]);
+        assert_eq!(counts("mlab"), []);
+    }
 
     #[test]
     fn every_design_is_a_contender_and_all_settings_resolve() {

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::capture::{CameraOptions, CaptureOptions, Faces, Order, PatternKind};
 use crate::design::{Configured, configure};
 use crate::error::{Error, Result};
+use crate::param::Options;
 use crate::study::engine::EngineName;
 use crate::trace::{MAX_SIDE, SamplePattern};
 
@@ -26,7 +27,20 @@ crate::options! {
     pub enum Publication {
         LaineKarras = "lk": "Laine and Karras: table 1, figures 1, 3, 5, 6",
         Methods = "methods": "Enderton's examples, Wyman's probabilities, hashes, LK figure 8",
+        Slab = "slab": "Wyman's claim: SLAB with 8 layers against 32 samples",
         Comparison = "comparison": "all designs at equal state, and Wyman's claim",
+    }
+}
+
+impl Publication {
+    /// As a study file names it.
+    pub fn name(self) -> &'static str {
+        Publication::CHOICES[self as usize].name
+    }
+
+    /// Whether another one measures all of this one's figures too.
+    pub fn is_part_of(self, other: Publication) -> bool {
+        self == Publication::Slab && other == Publication::Comparison
     }
 }
 
@@ -140,8 +154,7 @@ pub struct SceneEntry {
 
 /// What a study file need not say.
 mod defaults {
-    use super::{EngineName, Faces, Metric, Order, PatternKind};
-    use crate::param::Options;
+    use super::{EngineName, Faces, Metric, Options, Order, PatternKind};
     use crate::rop::Which;
 
     pub fn seeds() -> u32 {
@@ -216,6 +229,13 @@ impl Study {
         let spec =
             series.replace("{n}", &samples.to_string()).replace("{2n}", &(2 * samples).to_string());
         configure(&spec, &[])
+    }
+
+    /// The publications to measure: each once, and none that is part of another.
+    pub fn publications_to_measure(&self) -> Vec<Publication> {
+        let asked = |p: &Publication| self.publications.contains(p);
+        let covered = |p: Publication| self.publications.iter().any(|o| p.is_part_of(*o));
+        Publication::ALL.iter().copied().filter(|p| asked(p) && !covered(*p)).collect()
     }
 
     /// Whether a metric is asked for.
@@ -397,6 +417,16 @@ mod tests {
         let text = study.to_toml();
         assert!(text.contains("seeds = 8"), "{text}");
         assert_eq!(Study::parse(&text, "b.toml").unwrap(), study);
+    }
+
+    #[test]
+    fn publications_are_measured_once() {
+        let of = |list: &str| {
+            let text = SMALL.replace("[[scene]]", &format!("publications = [{list}]\n[[scene]]"));
+            Study::parse(&text, "a.toml").unwrap().publications_to_measure()
+        };
+        assert_eq!(of("'slab', 'lk', 'slab'"), [Publication::LaineKarras, Publication::Slab]);
+        assert_eq!(of("'slab', 'comparison'"), [Publication::Comparison]);
     }
 
     #[test]
