@@ -7,6 +7,7 @@ mod choice;
 mod convergence;
 mod cost;
 mod error;
+mod markdown;
 pub mod packed;
 mod page;
 mod parts;
@@ -14,8 +15,10 @@ mod perception;
 mod reproduce;
 #[cfg(test)]
 mod tests;
+pub mod verification;
 pub mod viewer;
 mod words;
 
+pub use markdown::Figure;
 pub use page::{DesignText, Extras, Place, Section, page};
 pub use words::grouped;

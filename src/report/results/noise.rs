@@ -7,7 +7,9 @@ use crate::report::markdown_table;
 use crate::report::results::against::{Against, Agreement, above, below};
 use crate::report::results::figures::show;
 use crate::report::results::plain;
-use crate::study::publications::{BLOCKS, EdgeNoise, FarSamples, Noise, Publications};
+use crate::study::publications::{
+    BLOCKS, CORRELATION_SEEDS, EdgeNoise, FarSamples, Noise, Publications,
+};
 
 fn of<'a>(list: &'a [Noise], design: &str) -> Option<&'a Noise> {
     list.iter().find(|n| n.design == design)
@@ -18,10 +20,11 @@ fn pair<'a>(list: &'a [Noise], designs: [&str; 2]) -> Option<[&'a Noise; 2]> {
     Some([of(list, designs[0])?, of(list, designs[1])?])
 }
 
-/// RMSE over blocks of pixels, and by how much it falls.
+/// RMSE over blocks of pixels, and by how much it falls; panels named where several.
 fn blocks(text: &mut String, panels: &[(&str, &[Noise])]) {
+    let named = panels.len() > 1;
     let sizes = BLOCKS.map(|b| format!("{b}×{b}"));
-    let mut header = vec!["panel", "design"];
+    let mut header = if named { vec!["panel", "design"] } else { vec!["design"] };
     header.extend(sizes.iter().map(String::as_str));
     let fall = format!("{} ÷ {}", sizes[0], sizes[BLOCKS.len() - 1]);
     header.push(&fall);
@@ -29,7 +32,8 @@ fn blocks(text: &mut String, panels: &[(&str, &[Noise])]) {
         .iter()
         .flat_map(|(panel, list)| list.iter().map(move |noise| (panel, noise)))
         .map(|(panel, noise)| {
-            let mut row = vec![panel.to_string(), format!("`{}`", noise.design)];
+            let mut row = if named { vec![panel.to_string()] } else { Vec::new() };
+            row.push(format!("`{}`", noise.design));
             row.extend(noise.rmse.iter().map(|e| plain(*e)));
             row.push(interval(noise.fall(), 1));
             row
@@ -156,11 +160,11 @@ pub(super) fn figure_3b_text(text: &mut String, p: &Publications, folder: &str) 
     let _ = writeln!(
         text,
         "Eight white layers of alpha 0.1 at 8 samples; RMSE in 8-bit units after averaging over \
-         blocks of pixels, {} seeds. `sort=false,compact=false` fixes reference values to samples, \
-         as in section 3 of the paper.\n",
-        p.effort.seeds
+         blocks of pixels, {CORRELATION_SEEDS} seeds. `sort=false,compact=false` fixes reference \
+         values to samples, as in section 3 of the paper. What is left over blocks of 8 × 8 pixels \
+         is common to many pixels of a frame; it changes from seed to seed.\n"
     );
-    blocks(text, &[("3", &p.noise.correlation)]);
+    blocks(text, &[("", &p.noise.correlation)]);
     show(text, &p.pictures, folder, |file| file == "figure-3");
 }
 
@@ -262,6 +266,6 @@ pub(super) fn figure_6_text(text: &mut String, p: &Publications, folder: &str) {
          8-bit units, also averaged over blocks of pixels.\n",
         p.effort.seeds
     );
-    blocks(text, &[("6", &p.noise.sorting)]);
+    blocks(text, &[("", &p.noise.sorting)]);
     show(text, &p.pictures, folder, |file| file == "figure-6");
 }

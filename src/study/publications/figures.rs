@@ -4,7 +4,7 @@ use crate::capture::CaptureOptions;
 use crate::error::Result;
 use crate::picture::Picture;
 use crate::scene;
-use crate::study::publications::noise::{FigureNoise, Noise, edge_noise, noise};
+use crate::study::publications::noise::{CORRELATION_SEEDS, FigureNoise, Noise, edge_noise, noise};
 use crate::study::publications::sampling::layers;
 use crate::study::publications::table_1::{SCENES, Table1Scene};
 use crate::study::publications::{Effort, capture, replay};
@@ -100,7 +100,7 @@ pub(super) fn figures(effort: Effort) -> Result<(Vec<NamedPicture>, FigureNoise)
     // Figure 3: eight white layers of alpha 0.1 at 8 samples.
     let eight = layers("count=8,alpha=0.1", 128, 8)?;
     let exact = replay("exact", &eight, 8, 0)?.picture;
-    let (trace, samples, exact) = (&eight, 8, &exact);
+    let (trace, samples, exact, seeds) = (&eight, 8, &exact, CORRELATION_SEEDS);
     let mut figure = Panels { trace, samples, exact, seeds, part, pictures: &mut pictures };
     let correlation = figure.draw(&[
         ("figure-3-lk2011", "lk"),
@@ -116,6 +116,7 @@ pub(super) fn figures(effort: Effort) -> Result<(Vec<NamedPicture>, FigureNoise)
     let cloth = capture(spec.source, &spec.options(side), false)?;
     let inset = [side * 3 / 8, side * 5 / 16];
     let corner = |p: &Picture| crop(p, inset, side / 4);
+    let seeds = effort.seeds;
     let exact = replay("exact", &cloth, 64, 0)?.picture;
     let (trace, samples, exact, part) = (&cloth, 64, &exact, &corner);
     let mut figure = Panels { trace, samples, exact, seeds, part, pictures: &mut pictures };

@@ -14,7 +14,7 @@ use std::path::Path;
 use serde::Serialize;
 
 pub use figures::NamedPicture;
-pub use noise::{BLOCKS, EdgeNoise, FigureNoise, Noise};
+pub use noise::{BLOCKS, CORRELATION_SEEDS, EdgeNoise, FigureNoise, Noise};
 pub use reproduced::{Reproduced, measure_publication};
 pub use sampling::{FarSamples, MeanError, RowDifference};
 pub use table_1::{Aspect, COUNTS, DESIGNS, Published, Table1, Variation};
@@ -51,7 +51,7 @@ impl Effort {
     /// What goes with every study: the publications' own figures within a minute on two
     /// cores, all of them together.
     pub const fn brief() -> Self {
-        Effort { seeds: 4, seeds_of_means: 16, side: 256, comparison_side: 96, brief: true }
+        Effort { seeds: 4, seeds_of_means: 16, side: 384, comparison_side: 96, brief: true }
     }
 }
 

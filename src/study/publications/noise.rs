@@ -13,6 +13,9 @@ use crate::trace::Trace;
 /// Sides of the square blocks of [`Noise::rmse`].
 pub const BLOCKS: [u32; 4] = [1, 2, 4, 8];
 
+/// Seeds of figure 3: what is common to a frame needs many frames, which are small.
+pub const CORRELATION_SEEDS: u32 = 32;
+
 /// The noise of the figures that LK print as pictures.
 #[derive(Clone, Debug, Serialize)]
 pub struct FigureNoise {
