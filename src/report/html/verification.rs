@@ -2,7 +2,7 @@
 //! all of it, and documents that were written as Markdown.
 
 use maud::{Markup, html};
-use pulldown_cmark::{Event, HeadingLevel, Options, Parser, Tag, TagEnd};
+use pulldown_cmark::{Event, HeadingLevel, Options, Parser, Tag, TagEnd, TextMergeStream};
 
 use crate::report::html::markdown::{Figure, inline, plain_text, rendered};
 use crate::report::html::page::{Place, Section};
@@ -27,8 +27,8 @@ pub fn summary(list: &[Against]) -> Section {
     let count = |agreement| list.iter().filter(|a| a.agreement == agreement).count();
     let body = html! {
         p class="prose" {
-            "What publications print or say, beside what is measured here on built-in scenes, which \
-             are not theirs. Of " (list.len()) ", "
+            "What publications print or say, beside what is measured here, on other scenes than \
+             theirs. Of " (list.len()) ", "
             (count(Agreement::Confirmed)) " confirmed, "
             (count(Agreement::InPart)) " in part, "
             (count(Agreement::Differs)) " not."
@@ -72,7 +72,9 @@ fn row(a: &Against) -> Markup {
 /// The sections of a Markdown document, split at its `##` headings; what stands before the
 /// first is left out. `figure` gives the bytes of a PNG by its file's name.
 pub fn sections(markdown: &str, figure: &Figure<'_>) -> Vec<Section> {
-    let events: Vec<Event<'_>> = Parser::new_ext(markdown, Options::ENABLE_TABLES).collect();
+    // Merged, so that a number and its interval in brackets are one text.
+    let parser = TextMergeStream::new(Parser::new_ext(markdown, Options::ENABLE_TABLES));
+    let events: Vec<Event<'_>> = parser.collect();
     let second =
         |e: &Event<'_>| matches!(e, Event::Start(Tag::Heading { level: HeadingLevel::H2, .. }));
     let starts: Vec<usize> = (0..events.len()).filter(|i| second(&events[*i])).collect();
@@ -100,7 +102,8 @@ mod tests {
     use crate::tile::TileGrid;
 
     const DOCUMENT: &str = "lost\n\n## LK table 1\n\nRMSE of `lk`, see [it](https://example.org).\n\n\
-        | samples | lk | what |\n|---:|---:|---|\n| 4 | 1.25 ± 0.01 | plain |\n\n\
+        | samples | lk | ratio | what |\n|---:|---:|---:|---|\n\
+        | 4 | 1.25 ± 0.01 | 0.9 [0.8, 1.0] | plain |\n\n\
         ![The ramps](verification/there.png)\n\n*Above*: the ramps.\n\nAfter.\n\n\
         ![Lost](gone.png)\n\n\
         ## Enderton's examples\n\n### Deeper\n\n\
@@ -137,8 +140,9 @@ mod tests {
         for part in [
             "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Table\"><table>\
              <thead><tr><th scope=\"col\" class=\"n\">samples</th>",
-            "<td class=\"n\">1.25<span class=\"pm\"> ± 0.01</span></td><td>plain</td></tr>\
-             </tbody></table></div>",
+            "<td class=\"n\">1.25<span class=\"pm\"> ± 0.01</span></td>\
+             <td class=\"n\">0.9<span class=\"pm\"> [0.8, 1.0]</span></td>\
+             <td>plain</td></tr></tbody></table></div>",
             "<a href=\"https://example.org\">it</a>",
         ] {
             assert!(body.contains(part), "{part} is not in {body}");

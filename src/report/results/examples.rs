@@ -42,11 +42,11 @@ pub(super) fn against(m: &Methods) -> Against {
         section: "Enderton's examples".to_string(),
         source: "Enderton et al. 2011, sections 3, 4 and 6".to_string(),
         printed: format!(
-            "standard deviations of two pixels by {} methods, and what is said of bias.",
+            "Standard deviations of two pixels by {} methods, and what is said of bias.",
             m.examples.len() / 2
         ),
         measured: format!(
-            "enumeration of every mask gives {holding} of {} rows as printed; the design's \
+            "Enumeration of every mask gives {holding} of {} rows as printed; the design's \
              deviations are within {worst:.3} of enumeration.",
             printed.len()
         ),

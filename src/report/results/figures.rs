@@ -165,7 +165,7 @@ pub(super) fn show(
     wanted: impl Fn(&str) -> bool,
 ) {
     let there = |name: &&str| pictures.iter().any(|(n, _)| n == name);
-    for figure in FIGURES.iter().filter(|f| wanted(f.file) && f.panels.iter().all(|n| there(n))) {
+    for figure in FIGURES.iter().filter(|f| wanted(f.file) && f.panels.iter().all(there)) {
         // The caption's first sentence is what stands for the picture.
         let what = figure.caption.split(". ").next().unwrap_or(figure.file).replace('`', "");
         let _ = writeln!(

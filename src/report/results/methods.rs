@@ -142,8 +142,8 @@ pub(super) fn figure_8_against(m: &Methods) -> Against {
     let advantage = found.map_or(0.0, |ratio| 100.0 * (1.0 - ratio.value));
     Against {
         section: "LK figure 8".to_string(),
-        source: "Laine and Karras 2011, section 6, figure 8".to_string(),
-        printed: "with an extreme number of layers LK loses most of its effectiveness, and never \
+        source: "Laine and Karras 2011, section 5, figure 8".to_string(),
+        printed: "With an extreme number of layers LK loses most of its effectiveness, and never \
                   performs worse than the comparison method."
             .to_string(),
         measured: format!(

@@ -70,12 +70,12 @@ pub(super) fn figure_1(p: &Publications) -> Against {
     Against {
         section: "LK figure 1".to_string(),
         source: "Laine and Karras 2011, figure 1".to_string(),
-        printed: "pictures. The comparison's noise is clumpy, there are problems at primitives' \
+        printed: "Pictures. The comparison's noise is clumpy, there are problems at primitives' \
                   edges, and its stratification degrades where layers overlap; LK dithers \
                   properly, has no edge artifacts and is better stratified over several layers."
             .to_string(),
         measured: format!(
-            "averaged over 8 × 8 pixels the noise of the ramps falls by {} with `lk`, by {} with \
+            "Averaged over 8 × 8 pixels the noise of the ramps falls by {} with `lk`, by {} with \
              `enderton`; where quads meet the RMSE is {lk_edge} and {e_edge}; on the cloth `lk` ÷ \
              `enderton` is {}.",
             number(falls.map(|f| f[1]), 1),
@@ -134,12 +134,12 @@ pub(super) fn figure_3b(p: &Publications) -> Against {
     Against {
         section: "LK figure 3b".to_string(),
         source: "Laine and Karras 2011, section 3, figure 3".to_string(),
-        printed: "pictures of eight white layers. (a) With a generic hash disjoint spans of the \
+        printed: "Pictures of eight white layers. (a) With a generic hash disjoint spans of the \
                   sequence are uncorrelated; (b) with the Sobol' sequence significant correlations \
                   remain when several surfaces are drawn."
             .to_string(),
         measured: format!(
-            "averaged over 8 × 8 pixels the error falls by {} with the hash, by {} with the Sobol' \
+            "Averaged over 8 × 8 pixels the error falls by {} with the hash, by {} with the Sobol' \
              sequence; there Sobol' ÷ hash is {}.",
             number(falls.map(|f| f[0]), 1),
             number(falls.map(|f| f[1]), 1),
@@ -189,7 +189,7 @@ pub(super) fn figure_5(p: &Publications) -> Against {
     Against {
         section: "LK figure 5".to_string(),
         source: "Laine and Karras 2011, section 4, figure 5".to_string(),
-        printed: "of 16 samples two surfaces of alpha 0.5 should leave the far one 4. (a) Without \
+        printed: "Of 16 samples two surfaces of alpha 0.5 should leave the far one 4. (a) Without \
                   correlation between surfaces 0 to 8; (b) with the survivors of the depth test \
                   numbered, 4 from near to far; (c) not from far to near; (d) with sorting, 4 \
                   again."
@@ -240,7 +240,7 @@ pub(super) fn figure_6(p: &Publications) -> Against {
     Against {
         section: "LK figure 6".to_string(),
         source: "Laine and Karras 2011, section 4, figure 6".to_string(),
-        printed: "pictures of a cloth of several layers, its triangles in random order. Without \
+        printed: "Pictures of a cloth of several layers, its triangles in random order. Without \
                   the sort the result is more noisy where surfaces are drawn far to near."
             .to_string(),
         measured: format!(

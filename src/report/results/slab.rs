@@ -87,12 +87,12 @@ pub(super) fn against(c: &Comparison) -> Against {
     let total = c.scenes.len();
     Against {
         section: "Wyman's claim".to_string(),
-        source: "Wyman 2016, section 1".to_string(),
+        source: "Wyman 2016, abstract".to_string(),
         printed: "SLAB is better than 32 samples of stochastic transparency for roughly the cost \
                   and memory of 8."
             .to_string(),
         measured: format!(
-            "with 8 layers, by normalisation, SLAB beats {CLAIMED} samples on {} of {total} scenes \
+            "With {SLAB_LAYERS} layers, by normalisation, SLAB beats {CLAIMED} samples on {} of {total} scenes \
              without antialiasing and on {} with it, for {least:.1} to {most:.1} times the state of \
              8 samples.",
             won(false),

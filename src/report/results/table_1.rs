@@ -48,7 +48,7 @@ pub(super) fn against(p: &Publications) -> Against {
             "LK's RMSE ÷ that of the comparison method falls from 4 to 64 samples from {motor} on \
              MOTOR and from {cloth} on CLOTH."
         ),
-        measured: format!("{}.", measured.join("; ")),
+        measured: format!("The same ratio: {}.", measured.join("; ")),
         agreement: Agreement::of(&statements),
         remark: format!(
             "From 4 to 64 samples LK gains on `enderton` on {faster} of {} scenes, and its error is \
