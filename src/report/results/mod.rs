@@ -145,3 +145,52 @@ fn ratio(a: Estimate, b: Estimate) -> String {
     }
     format!("{:.3} [{:.3}, {:.3}]", r.value, r.low, r.high)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::html::verification::{sections, summary};
+    use crate::study::publications::{Effort, measure_publication};
+
+    #[test]
+    fn every_claim_has_its_section_and_every_picture_is_there() {
+        let effort = Effort { seeds: 2, side: 64, comparison_side: 32, ..Effort::brief() };
+        let mut named = Vec::new();
+        for part in [Publication::LaineKarras, Publication::Methods, Publication::Slab] {
+            let measured = measure_publication(part, None, effort, |_, _, _| ()).unwrap();
+            assert_eq!((measured.publication(), measured.missing().len()), (part, 0));
+            let document = document(&measured, "verification");
+            let table = summary(&document.against).body.0;
+            let asked = std::cell::RefCell::new(Vec::new());
+            let found = sections(&document.markdown, &|file| {
+                asked.borrow_mut().push(file.to_string());
+                None
+            });
+            for against in &document.against {
+                let own = found.iter().find(|s| s.title == against.section).unwrap();
+                assert!(table.contains(&format!("href=\"#{}\"", own.anchor)), "{}", own.anchor);
+                let verdict = format!("<strong>Verdict</strong>: {}", against.agreement.word());
+                assert!(own.body.0.contains(&verdict), "{}", own.body.0);
+                named.push(against.section.clone());
+            }
+            let made = document.figures.iter().map(|(name, _)| format!("{name}.png"));
+            let (mut made, mut asked) = (made.collect::<Vec<_>>(), asked.into_inner());
+            made.sort();
+            asked.sort();
+            assert_eq!(made, asked);
+        }
+        assert_eq!(
+            named,
+            [
+                "LK table 1",
+                "LK figure 1",
+                "LK figure 3b",
+                "LK figure 5",
+                "LK figure 6",
+                "Enderton's examples",
+                "LK figure 8",
+                "Wyman's claim",
+            ]
+        );
+    }
+}

@@ -92,9 +92,9 @@ pub(super) fn against(c: &Comparison) -> Against {
                   and memory of 8."
             .to_string(),
         measured: format!(
-            "With {SLAB_LAYERS} layers, by normalisation, SLAB beats {CLAIMED} samples on {} of {total} scenes \
-             without antialiasing and on {} with it, for {least:.1} to {most:.1} times the state of \
-             8 samples.",
+            "With {SLAB_LAYERS} layers, by normalisation, SLAB beats {CLAIMED} samples on {} of \
+             {total} scenes without antialiasing and on {} with it, for {least:.1} to {most:.1} \
+             times the state of {SLAB_LAYERS} samples.",
             won(false),
             won(true)
         ),
