@@ -10,10 +10,9 @@ use crate::error::{Error, Result};
 use crate::output::OutputFile;
 use crate::param::Options;
 use crate::picture::write_png;
-use crate::report::{Measured, Part, results};
-use crate::study::comparison::compare;
-use crate::study::publications::methods::methods;
-use crate::study::publications::{Effort, reproduce};
+use crate::report::{Document, PARTS, document, results};
+use crate::study::file::Publication;
+use crate::study::publications::{Effort, measure_publication};
 
 /// Rerun the publications' experiments and write RESULTS.md with its figures
 #[derive(Debug, Args)]
@@ -39,13 +38,13 @@ pub(super) struct Arguments {
     comparison_side: u32,
     /// Measure only this part; the others stay in RESULTS.md as they are
     #[arg(long, value_name = "PART", value_parser = part)]
-    part: Option<Part>,
+    part: Option<Publication>,
 }
 
-fn part(text: &str) -> std::result::Result<Part, String> {
-    let names = || Part::CHOICES.iter().map(|c| c.name);
-    let found = names().position(|name| name == text);
-    found.map(|i| Part::ALL[i]).ok_or_else(|| Error::unknown("part", text, names()).to_string())
+fn part(text: &str) -> std::result::Result<Publication, String> {
+    let names = PARTS.iter().map(|part| part.name());
+    let found = PARTS.into_iter().find(|part| part.name() == text);
+    found.ok_or_else(|| Error::unknown("part", text, names).to_string())
 }
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
@@ -68,36 +67,28 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         seeds: arguments.seeds,
         seeds_of_means: arguments.seeds_of_means,
         side: arguments.side,
+        comparison_side: arguments.comparison_side,
+        brief: false,
     };
     let progress = console.progress("reproducing", "steps");
-    let watch = |what: &str, done, total| {
-        progress.name(what);
-        progress.set(done, total);
-    };
     let models = arguments.models.as_deref();
-    let wanted = |part| arguments.part.is_none_or(|only| only == part);
-    let publications =
-        wanted(Part::LaineKarras).then(|| reproduce(models, effort, watch)).transpose()?;
-    let methods = wanted(Part::Methods).then(|| methods(models, effort, watch)).transpose()?;
-    let comparison = wanted(Part::Comparison)
-        .then(|| compare(models, arguments.comparison_side, arguments.seeds, watch))
-        .transpose()?;
+    let mut documents: Vec<(Publication, Document)> = Vec::new();
+    let mut missing = Vec::new();
+    for part in PARTS.into_iter().filter(|p| arguments.part.is_none_or(|only| only == *p)) {
+        let watch = |what: &str, done, total| {
+            progress.name(what);
+            progress.set(done, total);
+        };
+        let measured = measure_publication(part, models, effort, watch)?;
+        missing.extend_from_slice(measured.missing());
+        documents.push((part, document(&measured, "figures")));
+    }
     drop(progress);
-    let missing = publications.iter().flat_map(|p| &p.missing);
-    let missing = missing.chain(comparison.iter().flat_map(|c| &c.missing));
     for missing in missing {
         console.warn(&format!("{missing}: not in the models' folder; its table is left out"));
     }
-    let measured: Vec<Measured<'_>> = [
-        publications.as_ref().map(Measured::LaineKarras),
-        methods.as_ref().map(Measured::Methods),
-        comparison.as_ref().map(Measured::Comparison),
-    ]
-    .into_iter()
-    .flatten()
-    .collect();
-    let pictures: Vec<_> = measured.iter().flat_map(Measured::figures).collect();
-    let text = results(&before, &measured, "figures");
+    let text = results(&before, &documents);
+    let pictures: Vec<_> = documents.into_iter().flat_map(|(_, d)| d.figures).collect();
     let save = || {
         for (name, picture) in &pictures {
             write_png(folder.join(format!("{name}.png")), picture)?;

@@ -7,9 +7,13 @@ use clap::Args;
 use crate::cli::console::{Console, shown};
 use crate::design::configure;
 use crate::error::{Error, Result};
+use crate::output::OutputFile;
+use crate::param::Options;
+use crate::picture::write_png;
 use crate::report::html::{DesignText, answer};
-use crate::report::{About, PAGE, write_report};
+use crate::report::{About, PAGE, document, write_report};
 use crate::study::file::Study;
+use crate::study::publications::{Effort, measure_publication};
 use crate::study::results::Results;
 use crate::study::run::{Runner, Shard, Store, merge};
 
@@ -100,11 +104,40 @@ pub(super) fn measured(store: &Store, place: Place<'_>, console: &Console) -> Re
         },
     };
     let outcome = runner.run()?;
+    let unpublished = publications(&runner)?;
     drop(progress);
-    for reason in Reason::all(&outcome.failed) {
+    for reason in Reason::all(&outcome.failed).iter().chain(&Reason::all(&unpublished)) {
         console.error(&Error::config(reason, "the report shows which as missing"));
     }
     reported(store, Some(place.command), console).map(|_| ())
+}
+
+/// Measures the part's publications that are not there yet. Returns which could not be, and
+/// why.
+fn publications(runner: &Runner<'_>) -> Result<Vec<(String, String)>> {
+    let store = runner.store;
+    let mut failed = Vec::new();
+    let pending = runner.publications();
+    let total = runner.tasks().len();
+    for (i, publication) in pending.iter().enumerate() {
+        let done = (total - pending.len() + i) as u64;
+        let told = |what: &str, _, _| {
+            (runner.watch)(&format!("{}: {what}", publication.name()), done, total as u64);
+        };
+        match measure_publication(*publication, None, Effort::brief(), told) {
+            Ok(reproduced) => {
+                let document = document(&reproduced, ".");
+                for (name, picture) in &document.figures {
+                    write_png(store.verification_file(&format!("{name}.png")), picture)?;
+                }
+                Store::put(&store.against_file(*publication), &document.against)?;
+                let path = store.document_file(*publication);
+                OutputFile::put(path, document.markdown.as_bytes())?;
+            }
+            Err(error) => failed.push((publication.name().to_string(), error.to_string())),
+        }
+    }
+    Ok(failed)
 }
 
 /// Why runs could not be done, with the first of them and how many others.

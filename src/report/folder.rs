@@ -9,13 +9,15 @@ use serde_json::Value;
 use crate::error::{Error, Result};
 use crate::metrics::{Estimate, Flip, FlipMap};
 use crate::output::OutputFile;
+use crate::param::Options;
 use crate::picture::{Picture, read};
 use crate::report::export;
 use crate::report::html::viewer::{self, ViewedPicture, ViewedScene};
-use crate::report::html::{DesignText, Extras, Place, Section, page, replay_command};
+use crate::report::html::{DesignText, Extras, Place, Section, page, replay_command, verification};
+use crate::report::results::Against;
 use crate::study::record::Record;
 use crate::study::results::{Results, SceneFacts};
-use crate::study::run::Store;
+use crate::study::run::{Store, read_json};
 
 /// The page's file in the folder.
 pub const PAGE: &str = "report.html";
@@ -48,9 +50,43 @@ pub fn write_report(store: &Store, about: About) -> Result<Results> {
         ..Extras::default()
     };
     extras.sections.push(pictures.section(&results));
+    extras.sections.extend(publications(store)?);
     extras.css.push(viewer::STYLE.to_string());
     put(PAGE, page(&results, &extras).as_bytes())?;
     Ok(results)
+}
+
+/// What publications print beside what was measured, and which were not measured.
+fn publications(store: &Store) -> Result<Vec<Section>> {
+    let mut against: Vec<Against> = Vec::new();
+    let mut sections = Vec::new();
+    let mut missing = Vec::new();
+    for publication in store.study().publications_to_measure() {
+        let path = store.document_file(publication);
+        if !path.exists() {
+            missing.push(publication.name());
+            continue;
+        }
+        let text = std::fs::read_to_string(&path).map_err(|e| Error::io("read", &path, e))?;
+        let figure = |name: &str| std::fs::read(store.verification_file(name)).ok();
+        sections.extend(verification::sections(&text, &figure));
+        against.extend(
+            read_json::<Vec<Against>>(&store.against_file(publication))?.unwrap_or_default(),
+        );
+    }
+    if store.study().publications.is_empty() {
+        return Ok(sections);
+    }
+    let mut summary = verification::summary(&against);
+    if !missing.is_empty() {
+        let rest = summary.body;
+        summary.body = maud::html! {
+            (rest)
+            p class="nothing" { "Not measured yet: " (missing.join(", ")) "." }
+        };
+    }
+    sections.insert(0, summary);
+    Ok(sections)
 }
 
 /// When the last run was finished, as the file system has it.

@@ -9,7 +9,7 @@ mod results;
 
 pub use folder::{About, PAGE, write_report};
 pub use montage::{Panel, montage};
-pub use results::{FIGURES, Figure, Measured, Part, results};
+pub use results::{Against, Agreement, Document, FIGURES, Figure, PARTS, document, results};
 
 /// A Markdown table; columns of numbers stand to the right.
 pub fn markdown_table(header: &[&str], rows: &[Vec<String>]) -> String {

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::capture::{CameraOptions, CaptureOptions, Faces, Order, PatternKind, pattern};
 use crate::design::{Configured, configure};
 use crate::error::{Error, Result};
+use crate::param::Options;
 use crate::study::engine::EngineName;
 use crate::trace::{MAX_SIDE, SamplePattern};
 
@@ -26,7 +27,15 @@ crate::options! {
     pub enum Publication {
         LaineKarras = "lk": "Laine and Karras: table 1, figures 1, 3, 5, 6",
         Methods = "methods": "Enderton's examples, Wyman's probabilities, hashes, LK figure 8",
+        Slab = "slab": "Wyman's claim: SLAB with 8 layers against 32 samples",
         Comparison = "comparison": "all designs at equal state, and Wyman's claim",
+    }
+}
+
+impl Publication {
+    /// Whether another one measures all of this one's figures too.
+    pub fn is_part_of(self, other: Publication) -> bool {
+        self == Publication::Slab && other == Publication::Comparison
     }
 }
 
@@ -140,8 +149,7 @@ pub struct SceneEntry {
 
 /// What a study file need not say.
 mod defaults {
-    use super::{EngineName, Faces, Metric, Order, PatternKind};
-    use crate::param::Options;
+    use super::{EngineName, Faces, Metric, Options, Order, PatternKind};
     use crate::rop::Which;
 
     pub fn seeds() -> u32 {
@@ -224,6 +232,13 @@ impl Study {
         let spec =
             series.replace("{n}", &samples.to_string()).replace("{2n}", &(2 * samples).to_string());
         configure(&spec, &[])
+    }
+
+    /// The publications to measure: each once, and none that is part of another.
+    pub fn publications_to_measure(&self) -> Vec<Publication> {
+        let asked = |p: &Publication| self.publications.contains(p);
+        let covered = |p: Publication| self.publications.iter().any(|o| p.is_part_of(*o));
+        Publication::ALL.iter().copied().filter(|p| asked(p) && !covered(*p)).collect()
     }
 
     /// Whether a metric is asked for.
@@ -419,6 +434,16 @@ mod tests {
         let study = Study::preset().unwrap();
         assert_eq!(study.baseline, "enderton");
         assert!(study.scenes.iter().all(|s| s.source.as_deref().unwrap().starts_with("builtin:")));
+    }
+
+    #[test]
+    fn publications_are_measured_once() {
+        let of = |list: &str| {
+            let text = SMALL.replace("[[scene]]", &format!("publications = [{list}]\n[[scene]]"));
+            Study::parse(&text, "a.toml").unwrap().publications_to_measure()
+        };
+        assert_eq!(of("'slab', 'lk', 'slab'"), [Publication::LaineKarras, Publication::Slab]);
+        assert_eq!(of("'slab', 'comparison'"), [Publication::Comparison]);
     }
 
     #[test]

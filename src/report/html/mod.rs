@@ -7,6 +7,7 @@ mod choice;
 mod convergence;
 mod cost;
 mod error;
+mod markdown;
 pub mod packed;
 mod page;
 mod parts;
@@ -14,10 +15,12 @@ mod perception;
 mod reproduce;
 #[cfg(test)]
 mod tests;
+pub mod verification;
 pub mod viewer;
 pub(in crate::report) mod words;
 
 pub use choice::answer;
+pub use markdown::Figure;
 pub use page::{DesignText, Extras, Place, Section, page};
 pub use parts::replay_command;
 pub use words::grouped;

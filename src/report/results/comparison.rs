@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use crate::report::markdown_table;
+use crate::report::results::slab;
 use crate::study::comparison::{ComparedScene, Comparison, Duel, Outcome};
 
 /// Counts of the printed tables.
@@ -18,9 +19,9 @@ pub(super) fn text(c: &Comparison) -> String {
         table(&mut text, c, count);
     }
     methods(&mut text, c);
-    slab(&mut text, c);
     winners(&mut text, c);
     duels(&mut text, c);
+    text.push_str(&slab::text(c));
     text
 }
 
@@ -144,100 +145,6 @@ fn methods(text: &mut String, c: &Comparison) {
         }
     }
     text.push_str(&markdown_table(&["design", "4", "8", "16", "32"], &rows));
-    text.push('\n');
-}
-
-/// SLAB with each normalisation, and stochastic transparency with the same.
-const CLAIMS: [[&str; 2]; 5] = [
-    ["slab", "enderton:method=depth-correction"],
-    ["slab:opacity=discrete", "enderton:method=depth-correction"],
-    ["slab:normalise=none", "enderton"],
-    ["slab:normalise=alpha", "enderton:method=alpha-correction"],
-    ["slab:normalise=depth", "enderton:method=depth"],
-];
-
-/// 'Better than 32× samples for about the memory of 8×'.
-fn slab(text: &mut String, c: &Comparison) {
-    let _ = writeln!(
-        text,
-        "### SLAB's claim\n\n\
-         Wyman 2016: better than 32 samples of stochastic transparency for about the memory and \
-         cost of 8. On how many of {} scenes `slab` with 8 layers has a smaller RMSE than \
-         `enderton` with the same normalisation at 8, 16 and 32 samples: with antialiasing, where \
-         each of the pieces of a surface that share a pixel takes a layer, and without, all \
-         samples at the pixel's centre, which is how both publications show theirs.\n",
-        c.scenes.len()
-    );
-    let sets = [("with", &c.scenes), ("without", &c.without_antialiasing)];
-    let mut rows = Vec::new();
-    for ((name, scenes), [slab, stochastic]) in
-        sets.iter().flat_map(|set| CLAIMS.iter().map(move |claim| (set, claim)))
-    {
-        let (Some(a), Some(b)) = (c.contender(slab), c.contender(stochastic)) else { continue };
-        let won = |count| {
-            let better = |s: &&ComparedScene| {
-                let error = |i, n| s.result(i, n).map(|r: &Outcome| r.errors.rmse.value);
-                error(a, 8) < error(b, count)
-            };
-            scenes.iter().filter(better).count()
-        };
-        let mut row = vec![name.to_string(), format!("`{slab}`"), format!("`{stochastic}`")];
-        row.extend([8, 16, 32].map(|count| won(count).to_string()));
-        let verdict = match won(32) {
-            n if n == scenes.len() => "confirmed".to_string(),
-            0 => "refuted".to_string(),
-            n => format!("on {n} of {}", scenes.len()),
-        };
-        row.push(verdict);
-        let bytes = |i| scenes.first().and_then(|s| s.result(i, 8)).map(|r| r.state_bytes);
-        let times = bytes(a).zip(bytes(b)).map(|(a, b)| format!("{:.1}", a / b));
-        row.push(times.unwrap_or_default());
-        rows.push(row);
-    }
-    let header = [
-        "antialiasing",
-        "design",
-        "against",
-        "8",
-        "16",
-        "32",
-        "better than 32",
-        "state ÷ that of 8 samples",
-    ];
-    text.push_str(&markdown_table(&header, &rows));
-    let _ = writeln!(
-        text,
-        "\nThe errors, without antialiasing (bytes of state per pixel in brackets; `kbuffer` is what \
-         `slab` becomes with ever more bits):\n"
-    );
-    let columns = [
-        ("slab", 8),
-        ("enderton:method=depth-correction", 8),
-        ("enderton:method=depth-correction", 32),
-        ("slab:normalise=none", 8),
-        ("enderton", 8),
-        ("enderton", 32),
-        ("kbuffer", 8),
-    ];
-    let rows: Vec<Vec<String>> = c
-        .without_antialiasing
-        .iter()
-        .map(|scene| {
-            let layers = scene.statistics.depth_complexity.mean;
-            let mut row = vec![scene.name.to_string(), format!("{layers:.1}")];
-            row.extend(columns.iter().map(|(label, count)| {
-                let found = c.contender(label).and_then(|i| scene.result(i, *count));
-                found.map_or("—".to_string(), |r| {
-                    format!("{:.2} ({:.0})", r.errors.rmse.value, r.state_bytes)
-                })
-            }));
-            row
-        })
-        .collect();
-    let names: Vec<String> = columns.iter().map(|(l, n)| format!("`{l}`, {n}")).collect();
-    let mut header = vec!["scene", "layers"];
-    header.extend(names.iter().map(String::as_str));
-    text.push_str(&markdown_table(&header, &rows));
     text.push('\n');
 }
 

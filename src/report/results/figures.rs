@@ -112,7 +112,10 @@ pub(super) fn figures(publications: &Publications) -> Vec<(&'static str, Picture
         .iter()
         .map(|(_, picture)| Panel { picture, crop: None, enlarge: 1 })
         .collect();
-    let mut list = vec![(GALLERY, montage(&scenes, 4))];
+    let mut list = Vec::new();
+    if !scenes.is_empty() {
+        list.push((GALLERY, montage(&scenes, 4)));
+    }
     list.extend(of(&publications.pictures));
     list
 }
@@ -139,24 +142,35 @@ pub(super) fn of(pictures: &[NamedPicture]) -> Vec<(&'static str, Picture)> {
         .collect()
 }
 
+/// The built-in scenes and the figures that belong to no other section.
 pub(super) fn pictures(text: &mut String, p: &Publications, folder: &str) {
+    if p.gallery.is_empty() {
+        return;
+    }
     let scenes: Vec<&str> = p.gallery.iter().map(|(name, _)| name.as_str()).collect();
     let _ = writeln!(
         text,
-        "## Pictures\n\n![{GALLERY}]({folder}/{GALLERY}.png)\n\n\
+        "## Pictures\n\n![The built-in scenes]({folder}/{GALLERY}.png)\n\n\
          The built-in scenes, composited exactly: {}.\n",
         scenes.join(", ")
     );
-    show(text, &p.pictures, folder);
+    show(text, &p.pictures, folder, |file| ["figure-9", "figure-10"].contains(&file));
 }
 
-/// Shows the figures that are made of `pictures`.
-pub(super) fn show(text: &mut String, pictures: &[NamedPicture], folder: &str) {
-    let there: Vec<&str> = pictures.iter().map(|(name, _)| *name).collect();
-    for figure in FIGURES.iter().filter(|f| f.panels.iter().all(|n| there.contains(n))) {
+/// Shows those of the figures that are made of `pictures` whose files are `wanted`.
+pub(super) fn show(
+    text: &mut String,
+    pictures: &[NamedPicture],
+    folder: &str,
+    wanted: impl Fn(&str) -> bool,
+) {
+    let there = |name: &&str| pictures.iter().any(|(n, _)| n == name);
+    for figure in FIGURES.iter().filter(|f| wanted(f.file) && f.panels.iter().all(there)) {
+        // The caption's first sentence is what stands for the picture.
+        let what = figure.caption.split(". ").next().unwrap_or(figure.file).replace('`', "");
         let _ = writeln!(
             text,
-            "![{file}]({folder}/{file}.png)\n\n{caption}\n",
+            "![{what}]({folder}/{file}.png)\n\n{caption}\n",
             file = figure.file,
             caption = figure.caption
         );

@@ -1,98 +1,22 @@
-//! The results' part on the methods.
+//! The results' part on the methods: Wyman's probabilities, hashes, LK figure 8.
 
 use std::fmt::Write;
 
 use crate::metrics::Estimate;
 use crate::report::markdown_table;
+use crate::report::results::against::{Against, Agreement, above};
 use crate::report::results::{plain, ratio};
-use crate::study::publications::examples::{ExampleRow, Moments};
 use crate::study::publications::hashes::TRIES;
-use crate::study::publications::methods::{MOST_BITS, Methods, TABLE_BITS};
+use crate::study::publications::methods::{Figure8, MOST_BITS, Methods, TABLE_BITS};
+use crate::study::publications::{COUNTS, Published};
 
-/// The text of the part.
-pub(super) fn text(m: &Methods) -> String {
-    let mut text = String::new();
-    examples(&mut text, m);
-    probabilities(&mut text, m);
-    hashes(&mut text, m);
-    figure_8(&mut text, m);
-    text
-}
-
-fn deviations(values: [f64; 3]) -> String {
-    let [r, g, b] = values;
-    if r == g && g == b {
-        return format!("{r:.3}");
+/// The text, but for Enderton's examples.
+pub(super) fn text(text: &mut String, m: &Methods) {
+    probabilities(text, m);
+    if !m.hashes.is_empty() {
+        hashes(text, m);
     }
-    format!("{r:.3} {g:.3} {b:.3}")
-}
-
-fn examples(text: &mut String, m: &Methods) {
-    let _ = writeln!(
-        text,
-        "## Enderton's examples\n\n\
-         Standard deviation of a pixel of 4 samples, for red, green and blue where they differ: as \
-         printed by Enderton et al. (TVCG 2011, section 3), by enumeration of every mask, and as \
-         `enderton` gives it with masks drawn among all covered samples, over 65 536 pixels and \
-         seeds; beside it the same method with the samples that `lk` and `systematic` choose, \
-         which the paper could not have.\n"
-    );
-    let rows: Vec<Vec<String>> = m.examples.iter().map(example_row).collect();
-    let header = ["example", "method", "printed", "enumerated", "enderton", "lk", "systematic"];
-    text.push_str(&markdown_table(&header, &rows));
-    let differ: Vec<String> = m
-        .examples
-        .iter()
-        .filter(|row| row.printed.is_some_and(|p| off(p, row.exact.deviation)))
-        .map(|row| format!("{} of {}", row.method, &row.example[..5]))
-        .collect();
-    let _ = writeln!(
-        text,
-        "\nPrinted and enumerated differ by more than 0.01 for: {}. Naive sampling in example 2 is \
-         printed for a single sample, which has {:.3}. What is printed for the corrected depth-based \
-         method in example 1 is not what its formula gives: the correction does no harm there.\n\n\
-         What the paper says of bias (sections 4 and 6):\n",
-        differ.join("; "),
-        // One sample of a white or 0.25 gray pixel.
-        single_sample_deviation(),
-    );
-    let rows: Vec<Vec<String>> = m
-        .bias_cases
-        .iter()
-        .map(|c| vec![c.name.clone(), c.printed.to_string(), c.exact.clone(), c.measured.clone()])
-        .collect();
-    text.push_str(&markdown_table(&["case", "printed", "enumerated", "measured"], &rows));
-    text.push('\n');
-}
-
-/// Whether values as printed, to two digits, are others than the exact ones.
-fn off(printed: [f64; 3], exact: [f64; 3]) -> bool {
-    printed.iter().zip(exact).any(|(p, e)| (p - e).abs() > 0.0105)
-}
-
-/// Example 2 with one sample: white with the probability 1 − 0.75⁴, or 0.25 gray.
-fn single_sample_deviation() -> f64 {
-    let behind = 0.75_f64.powi(4);
-    0.75 * (behind * (1.0 - behind)).sqrt()
-}
-
-fn example_row(row: &ExampleRow) -> Vec<String> {
-    let other = |name: &str| {
-        let found: Option<&(&str, Moments)> = row.others.iter().find(|(n, _)| *n == name);
-        found.map_or("—".to_string(), |(_, m)| deviations(m.deviation))
-    };
-    vec![
-        row.example.to_string(),
-        row.method.to_string(),
-        row.printed.map_or("—".to_string(), |p| {
-            let [r, g, b] = p;
-            if r == g && g == b { format!("{r:.2}") } else { format!("{r:.2} {g:.2} {b:.2}") }
-        }),
-        deviations(row.exact.deviation),
-        deviations(row.measured.deviation),
-        other("lk"),
-        other("systematic"),
-    ]
+    figure_8(text, m);
 }
 
 fn probabilities(text: &mut String, m: &Methods) {
@@ -188,18 +112,64 @@ fn orders(count: usize) -> String {
     if count > 1 << 15 { "—".to_string() } else { count.to_string() }
 }
 
+fn rmse(f: &Figure8, design: &str) -> Option<Estimate> {
+    f.rmse.iter().find(|(name, _)| *name == design).map(|(_, e)| *e)
+}
+
+/// The samples of figure 8.
+const SAMPLES: u32 = 16;
+
+/// The advantage, 1 − LK ÷ comparison, that the paper prints at figure 8's sample count:
+/// the smaller one of its two scenes.
+fn printed_advantage() -> f64 {
+    let advantages = [Published::Motor, Published::Cloth].into_iter().flat_map(|column| {
+        let rows = COUNTS.iter().zip(column.rmse());
+        rows.filter(|(n, _)| **n == SAMPLES).map(|(_, [lk, other])| 1.0 - lk / other)
+    });
+    advantages.fold(1.0, f64::min)
+}
+
+/// Figure 8 beside the paper's.
+pub(super) fn figure_8_against(m: &Methods) -> Against {
+    let f = &m.figure_8;
+    let pair = rmse(f, "lk").zip(rmse(f, "enderton"));
+    let found = pair.map(|(lk, e)| lk.ratio(e));
+    let never_worse = found.is_some_and(|ratio| !above(ratio, 1.0));
+    let printed = printed_advantage();
+    // Most of it is lost where less than half is left.
+    let lost = found.is_some_and(|ratio| 1.0 - ratio.value < printed / 2.0);
+    let shown = |design: &str| rmse(f, design).map_or("—".to_string(), plain);
+    let advantage = found.map_or(0.0, |ratio| 100.0 * (1.0 - ratio.value));
+    Against {
+        section: "LK figure 8".to_string(),
+        source: "Laine and Karras 2011, section 5, figure 8".to_string(),
+        printed: "With an extreme number of layers LK loses most of its effectiveness, and never \
+                  performs worse than the comparison method."
+            .to_string(),
+        measured: format!(
+            "RMSE {} of `lk`, {} of `enderton`: {} times.",
+            shown("lk"),
+            shown("enderton"),
+            pair.map_or("—".to_string(), |(lk, e)| ratio(lk, e))
+        ),
+        agreement: Agreement::of(&[never_worse, lost]),
+        remark: format!(
+            "`lk` is {} than `enderton`; its advantage is {advantage:.0} %, where table 1 prints \
+             {:.0} % or more at {SAMPLES} samples.",
+            if never_worse { "not worse" } else { "worse" },
+            100.0 * printed
+        ),
+    }
+}
+
 fn figure_8(text: &mut String, m: &Methods) {
     let f = &m.figure_8;
     let s = &f.statistics;
-    let find = |name: &str| -> Option<Estimate> {
-        f.rmse.iter().find(|(n, _)| *n == name).map(|(_, e)| *e)
-    };
+    figure_8_against(m).open(text);
     let _ = writeln!(
         text,
-        "## LK figure 8\n\n\
-         `{}` as billboards of alpha 0.05 at 16 samples, {} seeds: {:.2} million fragments, {:.0} \
-         per covered pixel (95 % have at most {}). LK: the method loses most of its advantage, and \
-         is never worse than the comparison.\n",
+        "`{}` as billboards of alpha 0.05 at 16 samples, {} seeds: {:.2} million fragments, {:.0} \
+         per covered pixel (95 % have at most {}).\n",
         f.source,
         m.effort.seeds,
         s.fragments as f64 / 1e6,
@@ -210,7 +180,7 @@ fn figure_8(text: &mut String, m: &Methods) {
         .rmse
         .iter()
         .map(|(name, e)| {
-            let of = |other| find(other).map_or("—".to_string(), |o| ratio(*e, o));
+            let of = |other| rmse(f, other).map_or("—".to_string(), |o| ratio(*e, o));
             vec![format!("`{name}`"), plain(*e), of("enderton"), of("enderton:mask=naive")]
         })
         .collect();

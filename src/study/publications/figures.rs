@@ -1,28 +1,15 @@
-//! Pictures, and what can be measured on them.
-
-use serde::Serialize;
+//! The pictures of LK's figures, and the noise of those that show it.
 
 use crate::capture::CaptureOptions;
 use crate::error::Result;
-use crate::metrics::{Region, errors};
 use crate::picture::Picture;
 use crate::scene;
+use crate::study::publications::noise::{CORRELATION_SEEDS, FigureNoise, Noise, edge_noise, noise};
 use crate::study::publications::sampling::layers;
 use crate::study::publications::table_1::{SCENES, Table1Scene};
 use crate::study::publications::{Effort, capture, replay};
 use crate::tile::TileGrid;
-
-/// Error that is left when pixels are averaged over square blocks.
-#[derive(Clone, Debug, Serialize)]
-pub struct Dithering {
-    /// The design.
-    pub design: String,
-    /// RMSE over blocks of [`BLOCKS`] pixels a side.
-    pub rmse: [f64; 4],
-}
-
-/// Sides of the blocks of [`Dithering`].
-pub const BLOCKS: [u32; 4] = [1, 2, 4, 8];
+use crate::trace::Trace;
 
 /// Every built-in scene that looks like something, small.
 pub(super) fn gallery() -> Result<Vec<(String, Picture)>> {
@@ -63,60 +50,96 @@ fn crop(picture: &Picture, [x0, y0]: [u32; 2], side: u32) -> Picture {
     Picture::from_fn(TileGrid::new(side, side), |x, y| picture.get(x0 + x, y0 + y))
 }
 
-/// The pictures by name, and the noise of figure 1's ramps.
-pub(super) fn figures(effort: Effort) -> Result<(Vec<NamedPicture>, Vec<Dithering>)> {
-    let (mut pictures, mut dithering) = (Vec::new(), Vec::new());
+/// What a figure's panels share.
+struct Panels<'a> {
+    trace: &'a Trace,
+    samples: u32,
+    exact: &'a Picture,
+    seeds: u32,
+    /// The part of the picture that is shown.
+    part: &'a dyn Fn(&Picture) -> Picture,
+    pictures: &'a mut Vec<NamedPicture>,
+}
+
+impl Panels<'_> {
+    /// Draws panels, by name and design: keeps the first seed's picture of each and
+    /// gives the noise over all seeds.
+    fn draw(&mut self, panels: &[(&'static str, &'static str)]) -> Result<Vec<Noise>> {
+        let exact = (self.part)(self.exact);
+        let mut list = Vec::new();
+        for (name, design) in panels {
+            let mut shown = Vec::new();
+            for seed in 0..self.seeds {
+                let picture = replay(design, self.trace, self.samples, seed)?.picture;
+                shown.push((self.part)(&picture));
+            }
+            list.push(noise(design, self.samples, &shown, &exact));
+            self.pictures.extend(shown.into_iter().next().map(|picture| (*name, picture)));
+        }
+        Ok(list)
+    }
+}
+
+/// The pictures by name, and the noise in them.
+pub(super) fn figures(effort: Effort) -> Result<(Vec<NamedPicture>, FigureNoise)> {
+    let mut pictures = Vec::new();
+    let seeds = effort.seeds;
+    let whole = |p: &Picture| p.clone();
     // Figure 1, left: the ramps.
     let options =
         CaptureOptions { width: 256, height: 256, samples: 16, ..CaptureOptions::default() };
     let ramps = capture("builtin:ramps", &options, false)?;
     let exact = replay("exact", &ramps, 16, 0)?.picture;
-    for (name, spec) in [("figure-1-enderton", "enderton"), ("figure-1-lk", "lk")] {
-        let picture = replay(spec, &ramps, 16, 0)?.picture;
-        let rmse = BLOCKS.map(|side| {
-            let (a, b) = (averaged(&picture, side), averaged(&exact, side));
-            errors(&a, &b, &Region::frame(a.grid())).rmse
-        });
-        dithering.push(Dithering { design: spec.to_string(), rmse });
-        pictures.push((name, picture));
-    }
+    let (trace, samples, part, exact) = (&ramps, 16, &whole, &exact);
+    let mut figure = Panels { trace, samples, exact, seeds, part, pictures: &mut pictures };
+    let dithering = figure.draw(&[("figure-1-enderton", "enderton"), ("figure-1-lk", "lk")])?;
+    let edges = ["enderton", "lk"]
+        .into_iter()
+        .map(|design| edge_noise(design, trace, samples, exact, seeds))
+        .collect::<Result<_>>()?;
     // Figure 3: eight white layers of alpha 0.1 at 8 samples.
     let eight = layers("count=8,alpha=0.1", 128, 8)?;
-    for (name, spec) in [
+    let exact = replay("exact", &eight, 8, 0)?.picture;
+    let (trace, samples, exact, seeds) = (&eight, 8, &exact, CORRELATION_SEEDS);
+    let mut figure = Panels { trace, samples, exact, seeds, part, pictures: &mut pictures };
+    let correlation = figure.draw(&[
         ("figure-3-lk2011", "lk"),
         ("figure-3-sobol", "lk:reference=sobol"),
-        ("figure-3-sobol-static", "lk:reference=sobol,sort=false,compact=false"),
-        ("figure-3-lk2011-static", "lk:sort=false,compact=false"),
-        ("figure-3-radical-inverse", "lk:reference=radical-inverse,sort=false,compact=false"),
         ("figure-3-white", "lk:reference=white"),
-    ] {
-        pictures.push((name, replay(spec, &eight, 8, 0)?.picture));
-    }
+        ("figure-3-lk2011-static", "lk:sort=false,compact=false"),
+        ("figure-3-sobol-static", "lk:reference=sobol,sort=false,compact=false"),
+        ("figure-3-radical-inverse", "lk:reference=radical-inverse,sort=false,compact=false"),
+    ])?;
     // Figures 1, right, 6 and 10: the cloth, triangles in random order.
     let side = effort.side;
     let spec = built_in("builtin:cloth");
     let cloth = capture(spec.source, &spec.options(side), false)?;
     let inset = [side * 3 / 8, side * 5 / 16];
     let corner = |p: &Picture| crop(p, inset, side / 4);
-    pictures.push(("cloth-exact", replay("exact", &cloth, 64, 0)?.picture));
-    for (name, spec, samples) in [
-        ("figure-1-cloth-enderton", "enderton", 64),
-        ("figure-1-cloth-lk", "lk", 64),
-        ("figure-6-unsorted", "lk:sort=false", 16),
-        ("figure-6-sorted", "lk", 16),
-    ] {
-        pictures.push((name, corner(&replay(spec, &cloth, samples, 0)?.picture)));
+    let seeds = effort.seeds;
+    let exact = replay("exact", &cloth, 64, 0)?.picture;
+    let (trace, samples, exact, part) = (&cloth, 64, &exact, &corner);
+    let mut figure = Panels { trace, samples, exact, seeds, part, pictures: &mut pictures };
+    let cloth_noise =
+        figure.draw(&[("figure-1-cloth-enderton", "enderton"), ("figure-1-cloth-lk", "lk")])?;
+    let exact = replay("exact", &cloth, 16, 0)?.picture;
+    let (samples, exact) = (16, &exact);
+    let mut figure = Panels { trace, samples, exact, seeds, part, pictures: &mut pictures };
+    let sorting =
+        figure.draw(&[("figure-6-unsorted", "lk:sort=false"), ("figure-6-sorted", "lk")])?;
+    if !effort.brief {
+        for (name, spec) in [("figure-10-enderton", "enderton"), ("figure-10-lk", "lk")] {
+            pictures.push((name, replay(spec, &cloth, 16, 0)?.picture));
+        }
+        // Figure 9: the motor.
+        let spec = built_in("builtin:engine");
+        let engine = capture(spec.source, &spec.options(side), spec.white)?;
+        for (name, design) in [("figure-9-enderton", "enderton"), ("figure-9-lk", "lk")] {
+            pictures.push((name, replay(design, &engine, 16, 0)?.picture));
+        }
     }
-    for (name, spec) in [("figure-10-enderton", "enderton"), ("figure-10-lk", "lk")] {
-        pictures.push((name, replay(spec, &cloth, 16, 0)?.picture));
-    }
-    // Figure 9: the motor.
-    let spec = built_in("builtin:engine");
-    let engine = capture(spec.source, &spec.options(side), spec.white)?;
-    for (name, design) in [("figure-9-enderton", "enderton"), ("figure-9-lk", "lk")] {
-        pictures.push((name, replay(design, &engine, 16, 0)?.picture));
-    }
-    Ok((pictures, dithering))
+    let noise = FigureNoise { dithering, edges, cloth: cloth_noise, correlation, sorting };
+    Ok((pictures, noise))
 }
 
 fn built_in(source: &str) -> &'static Table1Scene {

@@ -25,7 +25,7 @@ pub struct Methods {
     pub bias_cases: Vec<BiasCase>,
     /// Wyman's probabilities.
     pub probabilities: Probabilities,
-    /// The hashes.
+    /// The hashes; none where brief.
     pub hashes: Vec<HashRow>,
     /// LK figure 8.
     pub figure_8: Figure8,
@@ -77,7 +77,10 @@ pub fn methods(
     progress("Wyman's probabilities", 1, 4);
     let probabilities = probabilities();
     progress("hashes", 2, 4);
-    let hashes = hashes(effort.seeds_of_means.min(64))?;
+    let hashes = match effort.brief {
+        true => Vec::new(),
+        false => hashes(effort.seeds_of_means.min(64))?,
+    };
     progress("LK figure 8", 3, 4);
     let (figure_8, pictures) = figure_8(models, effort)?;
     Ok(Methods { effort, examples, bias_cases, probabilities, hashes, figure_8, pictures })

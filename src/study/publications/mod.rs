@@ -4,6 +4,8 @@ pub mod examples;
 mod figures;
 pub mod hashes;
 pub mod methods;
+mod noise;
+mod reproduced;
 mod sampling;
 mod table_1;
 
@@ -11,7 +13,9 @@ use std::path::Path;
 
 use serde::Serialize;
 
-pub use figures::{BLOCKS, Dithering, NamedPicture};
+pub use figures::NamedPicture;
+pub use noise::{BLOCKS, CORRELATION_SEEDS, EdgeNoise, FigureNoise, Noise};
+pub use reproduced::{Reproduced, measure_publication};
 pub use sampling::{FarSamples, MeanError, RowDifference};
 pub use table_1::{Aspect, COUNTS, DESIGNS, Published, Table1, Variation};
 
@@ -36,6 +40,19 @@ pub struct Effort {
     pub seeds_of_means: u32,
     /// Frame side in pixels of table 1.
     pub side: u32,
+    /// Frame side in pixels of Wyman's claim and of the comparison of all designs.
+    pub comparison_side: u32,
+    /// Only what the publications print or claim, on built-in scenes: no other views, no
+    /// expectations, no pixel orders, no hashes, no gallery.
+    pub brief: bool,
+}
+
+impl Effort {
+    /// What goes with every study: the publications' own figures within a minute on two
+    /// cores, all of them together.
+    pub const fn brief() -> Self {
+        Effort { seeds: 4, seeds_of_means: 16, side: 384, comparison_side: 96, brief: true }
+    }
 }
 
 /// Everything that is reproduced.
@@ -47,17 +64,17 @@ pub struct Publications {
     pub table_1: Vec<Table1>,
     /// Scenes of table 1 whose models were not given.
     pub missing: Vec<&'static str>,
-    /// The ratio of table 1 as the scene is seen otherwise.
+    /// The ratio of table 1 as the scene is seen otherwise; none where brief.
     pub variations: Vec<Variation>,
     /// Figure 5: samples left to the far surface.
     pub far_samples: Vec<FarSamples>,
-    /// Mean errors of `lk` and its ablations.
+    /// Mean errors of `lk` and its ablations; none where brief.
     pub means: Vec<MeanError>,
-    /// Row structure of the pixel orders.
+    /// Row structure of the pixel orders; none where brief.
     pub pixel_orders: Vec<RowDifference>,
-    /// Noise of figure 1's ramps, averaged over blocks of pixels.
-    pub dithering: Vec<Dithering>,
-    /// The built-in scenes, composited exactly.
+    /// Noise of figures 1, 3 and 6.
+    pub noise: FigureNoise,
+    /// The built-in scenes, composited exactly; none where brief.
     pub gallery: Vec<(String, Picture)>,
     /// Pictures by name.
     pub pictures: Vec<NamedPicture>,
@@ -75,12 +92,16 @@ pub fn reproduce(
 ) -> Result<Publications> {
     let (mut tables, mut variations, mut missing) = (Vec::new(), Vec::new(), Vec::new());
     let mut means = Vec::new();
-    for spec in table_1::SCENES {
+    let wanted = |spec: &&table_1::Table1Scene| !effort.brief || spec.is_built_in();
+    for spec in table_1::SCENES.iter().filter(wanted) {
         let Some(source) = spec.locate(models) else {
             missing.push(spec.source);
             continue;
         };
         tables.push(spec.measure(&source, effort, &mut progress)?);
+        if effort.brief {
+            continue;
+        }
         variations.extend(spec.vary(&source, effort, &mut progress)?);
         // Expectations on the first scene in random order: there surfaces mix.
         if spec.stands_for == Published::Cloth && means.is_empty() {
@@ -89,7 +110,11 @@ pub fn reproduce(
         }
     }
     progress("figures", 0, 1);
-    let (pictures, dithering) = figures::figures(effort)?;
+    let (pictures, noise) = figures::figures(effort)?;
+    let (pixel_orders, gallery) = match effort.brief {
+        true => (Vec::new(), Vec::new()),
+        false => (sampling::pixel_orders(effort)?, figures::gallery()?),
+    };
     Ok(Publications {
         effort,
         table_1: tables,
@@ -97,9 +122,9 @@ pub fn reproduce(
         variations,
         far_samples: sampling::far_samples()?,
         means,
-        pixel_orders: sampling::pixel_orders(effort)?,
-        dithering,
-        gallery: figures::gallery()?,
+        pixel_orders,
+        noise,
+        gallery,
         pictures,
     })
 }

@@ -152,6 +152,11 @@ impl Table1Scene {
 }
 
 impl Table1Scene {
+    /// Whether it needs no file.
+    pub fn is_built_in(&self) -> bool {
+        scene::path_of(self.source).is_none()
+    }
+
     /// The scene as it can be loaded; `None` for a model that is not there.
     pub fn locate(&self, models: Option<&Path>) -> Option<String> {
         let Some(file) = scene::path_of(self.source) else {

@@ -2,10 +2,10 @@
 
 use std::fs::{self, File};
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
-use crate::output::OutputFile;
+use crate::output::{OutputFile, is_partial};
 use crate::study::record::Record;
 use crate::study::run::store::Store;
 
@@ -83,12 +83,11 @@ fn bring(into: &Store, part: &Store) -> Result<()> {
         copy(&part.folder().join(part.trace_name(scene)))?;
     }
     let verification = part.folder().join("verification");
-    for entry in fs::read_dir(&verification).into_iter().flatten().flatten() {
-        let name = entry.file_name();
-        if !name.as_encoded_bytes().starts_with(b".") {
-            copy(&entry.path())?;
-        }
-    }
+    let entries = fs::read_dir(&verification).into_iter().flatten().flatten();
+    let mut files: Vec<PathBuf> = entries.map(|e| e.path()).filter(|p| !is_partial(p)).collect();
+    // Documents last: where they are, all that belongs to them is.
+    files.sort_by_key(|p| p.extension().is_some_and(|e| e == "md"));
+    files.iter().try_for_each(|path| copy(path))?;
     for job in part.jobs() {
         if part.record(job)?.is_some() {
             copy(&part.folder().join(Store::picture_name(&job.id)))?;

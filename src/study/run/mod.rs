@@ -12,7 +12,7 @@ use std::path::Path;
 
 pub use measure::SIGMAS;
 pub use merge::merge;
-pub use store::{Store, document};
+pub use store::{Store, read_json};
 pub use tasks::{Job, Shard, Task, jobs, tasks};
 
 use crate::error::{Error, Result};

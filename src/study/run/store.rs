@@ -10,7 +10,7 @@ use serde::de::DeserializeOwned;
 use crate::error::{Error, Result};
 use crate::output::{OutputFile, is_partial};
 use crate::param::Options;
-use crate::study::file::{Publication, Study, read_text};
+use crate::study::file::{Publication, Study};
 use crate::study::record::Record;
 use crate::study::results::{Machine, Missing, Results, SceneFacts};
 use crate::study::run::tasks::{Job, jobs};
@@ -141,9 +141,19 @@ impl Store {
         self.folder.join("explain").join(format!("{id}.json"))
     }
 
-    /// A publication's document.
+    /// A file of what publications print beside what is measured.
+    pub fn verification_file(&self, name: &str) -> PathBuf {
+        self.folder.join("verification").join(name)
+    }
+
+    /// A publication's document, written last of what belongs to it.
     pub fn document_file(&self, publication: Publication) -> PathBuf {
-        self.folder.join("verification").join(format!("{}.md", publication.name()))
+        self.verification_file(&format!("{}.md", publication.name()))
+    }
+
+    /// A publication's figures as JSON.
+    pub fn against_file(&self, publication: Publication) -> PathBuf {
+        self.verification_file(&format!("{}.json", publication.name()))
     }
 
     /// A scene's facts, where its trace has been there.
@@ -151,7 +161,7 @@ impl Store {
     /// # Errors
     /// [`Error::Invalid`] for a damaged file; [`Error::Io`] where it cannot be read.
     pub fn facts(&self, scene: usize) -> Result<Option<SceneFacts>> {
-        read(&self.scene_file(scene))
+        read_json(&self.scene_file(scene))
     }
 
     /// A run's record, where it is finished.
@@ -160,7 +170,7 @@ impl Store {
     /// As [`Store::facts`].
     pub fn record(&self, job: &Job) -> Result<Option<Record>> {
         let path = self.record_file(&job.id);
-        let record: Option<Record> = read(&path)?;
+        let record: Option<Record> = read_json(&path)?;
         let own = |r: &Record| {
             (r.series.as_str(), r.samples) == (job.series.as_str(), job.samples)
                 && r.scene == self.study.scenes[job.scene].name
@@ -208,7 +218,7 @@ impl Store {
     /// # Errors
     /// As [`Store::facts`].
     pub fn machines(&self) -> Result<Vec<Machine>> {
-        Ok(read(&self.folder.join(MACHINES))?.unwrap_or_default())
+        Ok(read_json(&self.folder.join(MACHINES))?.unwrap_or_default())
     }
 
     /// Everything that is there.
@@ -230,7 +240,7 @@ impl Store {
             match self.record(job)? {
                 Some(record) => results.records.push(record),
                 None => {
-                    let failure: Option<Missing> = read(&self.failure_file(&job.id))?;
+                    let failure: Option<Missing> = read_json(&self.failure_file(&job.id))?;
                     results.missing.push(self.missing(job, failure.and_then(|f| f.why)));
                 }
             }
@@ -284,7 +294,10 @@ fn lock(folder: &Path) -> Result<File> {
 }
 
 /// The value in a file of JSON; `None` where there is no file.
-pub(super) fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>> {
+///
+/// # Errors
+/// [`Error::Invalid`] for a damaged file; [`Error::Io`] where it cannot be read.
+pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<Option<T>> {
     let bytes = match fs::read(path) {
         Ok(bytes) => bytes,
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
@@ -295,16 +308,4 @@ pub(super) fn read<T: DeserializeOwned>(path: &Path) -> Result<Option<T>> {
 
 fn damaged(path: &Path, what: &str) -> Error {
     Error::invalid(path.display(), what, "remove it to have it measured again")
-}
-
-/// The text of a publication's document, where it has been measured.
-///
-/// # Errors
-/// [`Error::Io`] where it cannot be read.
-pub fn document(store: &Store, publication: Publication) -> Result<Option<String>> {
-    let path = store.document_file(publication);
-    if !path.exists() {
-        return Ok(None);
-    }
-    read_text(&path).map(Some)
 }

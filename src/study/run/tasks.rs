@@ -46,7 +46,7 @@ pub fn jobs(study: &Study) -> Vec<Job> {
 
 /// Everything that a study asks for: its runs, then the publications.
 pub fn tasks(study: &Study) -> Vec<Task> {
-    let publications = study.publications.iter().copied().map(Task::Publication);
+    let publications = study.publications_to_measure().into_iter().map(Task::Publication);
     jobs(study).into_iter().map(Task::Run).chain(publications).collect()
 }
 

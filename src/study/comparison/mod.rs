@@ -1,17 +1,21 @@
 //! All designs over the same fragments: error and bias, state and passes; and the
 //! question who wins at equal state.
 
+mod contenders;
+
 use std::path::Path;
 
 use serde::Serialize;
 
+pub use contenders::{Contender, SLAB_CLAIM, SLAB_LAYERS, SLAB_LIMIT, SLAB_RIVALS, contenders};
+
 use crate::capture::{Capture, CaptureOptions, Faces, Order, PatternKind};
-use crate::design::{Configured, DESIGNS, Entry, REFERENCE, configure};
+use crate::design::{REFERENCE, configure};
 use crate::error::Result;
 use crate::metrics::{Ensemble, EnsembleErrors, PixelClasses};
-use crate::param::Kind;
-use crate::rop::{Family, Frame, ReplayOptions};
+use crate::rop::{Frame, ReplayOptions};
 use crate::scene;
+use crate::study::comparison::contenders::claimed;
 use crate::trace::{Statistics, Trace, statistics};
 
 /// Samples per pixel, or layers, that every design is run with.
@@ -56,84 +60,6 @@ const BUILT_IN: [SceneSpec; 5] = [
     scene("hair", "builtin:hair", None),
     scene("smoke", "builtin:smoke", None),
 ];
-
-/// A design in the comparison: its settings for any count.
-#[derive(Clone, Debug, Serialize)]
-pub struct Contender {
-    /// Name and settings without the count.
-    pub label: String,
-    /// Its family.
-    pub family: Family,
-    /// Whether the count is one of layers too.
-    pub layered: bool,
-    /// The design's name.
-    name: &'static str,
-    settings: Vec<(String, String)>,
-    /// Parameters that follow the count, as (name, times the count).
-    counted: Vec<(&'static str, u32)>,
-    /// Whether the application must sort for it.
-    pub sorted_by_application: bool,
-    /// Whether it can do without a z-buffer for opaque fragments.
-    opaque_apart: bool,
-}
-
-/// Parameters whose every value makes a contender of its own: they name methods.
-const METHODS: [&str; 4] = ["method", "normalise", "moments", "opacity"];
-
-/// The contenders: every design of the registry with its defaults, and with each of
-/// its methods.
-pub fn contenders() -> Vec<Contender> {
-    let mut list = Vec::new();
-    for entry in DESIGNS.iter().filter(|e| e.info.name != REFERENCE) {
-        list.push(Contender::of(entry, &[]));
-        for param in entry.info.params.iter().filter(|p| METHODS.contains(&p.name)) {
-            let Kind::Choice { options } = param.kind else { continue };
-            for option in options.iter().filter(|o| o.name != param.default) {
-                list.push(Contender::of(entry, &[(param.name, option.name)]));
-            }
-        }
-        if entry.info.params.iter().any(|p| p.name == "mask") {
-            list.push(Contender::of(entry, &[("mask", "naive")]));
-        }
-    }
-    list
-}
-
-impl Contender {
-    fn of(entry: &Entry, settings: &[(&str, &str)]) -> Self {
-        let has = |name: &str| entry.info.params.iter().any(|p| p.name == name);
-        let settings: Vec<(String, String)> =
-            settings.iter().map(|(k, v)| (k.to_string(), v.to_string())).collect();
-        // Wyman's figure 1: twice as many coverage bits as layers.
-        let counted: Vec<(&str, u32)> =
-            [("layers", 1), ("bits", 2)].into_iter().filter(|(name, _)| has(name)).collect();
-        let shown: Vec<String> = settings.iter().map(|(k, v)| format!("{k}={v}")).collect();
-        let separator = if shown.is_empty() { "" } else { ":" };
-        Contender {
-            label: format!("{}{separator}{}", entry.info.name, shown.join(",")),
-            family: entry.info.family,
-            layered: counted.iter().any(|(name, _)| *name == "layers"),
-            name: entry.info.name,
-            settings,
-            counted,
-            sorted_by_application: entry.asks_for_primitive_depths(),
-            opaque_apart: has(crate::rop::over_opaque::PARAM.name),
-        }
-    }
-
-    /// The design for `count` samples or layers, with a z-buffer for opaque fragments
-    /// where the scene has any.
-    fn at(&self, count: u32, has_opaque: bool) -> Result<Configured> {
-        let mut settings = self.settings.clone();
-        let counted = |(name, times): &(&str, u32)| (name.to_string(), (times * count).to_string());
-        settings.extend(self.counted.iter().map(counted));
-        if self.opaque_apart && !has_opaque {
-            settings
-                .push((crate::rop::over_opaque::PARAM.name.to_string(), "together".to_string()));
-        }
-        configure(self.name, &settings)
-    }
-}
 
 /// One contender at one count on one scene.
 #[derive(Clone, Debug, Serialize)]
@@ -203,24 +129,44 @@ pub struct Comparison {
     /// On what.
     pub scenes: Vec<ComparedScene>,
     /// The same scenes with all samples at the pixels' centres, as Enderton et al. and
-    /// Wyman show theirs; with the designs of [`SLAB_CLAIM`] alone.
+    /// Wyman show theirs; with what [`SLAB_CLAIM`] is about alone.
     pub without_antialiasing: Vec<ComparedScene>,
     /// Models that were not given.
     pub missing: Vec<&'static str>,
 }
 
-/// The designs that Wyman's claim is about.
-pub const SLAB_CLAIM: [&str; 3] = ["slab", "enderton", "kbuffer"];
-
 /// Compares all designs on the models in a folder, or on built-in scenes where no
 /// folder is given.
 ///
 /// # Errors
-/// As [`scene::load`] and [`Configured::replay`].
+/// As [`scene::load`] and [`crate::design::Configured::replay`].
 pub fn compare(
     models: Option<&Path>,
     side: u32,
     seeds: u32,
+    progress: impl FnMut(&str, u64, u64),
+) -> Result<Comparison> {
+    compare_some(models, side, seeds, |_, _| true, progress)
+}
+
+/// As [`compare`], but only what [`SLAB_CLAIM`] is about.
+///
+/// # Errors
+/// As [`compare`].
+pub fn compare_slab(
+    models: Option<&Path>,
+    side: u32,
+    seeds: u32,
+    progress: impl FnMut(&str, u64, u64),
+) -> Result<Comparison> {
+    compare_some(models, side, seeds, claimed, progress)
+}
+
+fn compare_some(
+    models: Option<&Path>,
+    side: u32,
+    seeds: u32,
+    wanted: fn(&Contender, u32) -> bool,
     mut progress: impl FnMut(&str, u64, u64),
 ) -> Result<Comparison> {
     let contenders = contenders();
@@ -235,8 +181,7 @@ pub fn compare(
         };
         let before = (i * contenders.len()) as u64;
         let watch = |done: usize| progress(spec.name, before + done as u64, total);
-        scenes.push(compared(spec.name, &trace, &contenders, |_| true, seeds, watch)?);
-        let claimed = |c: &Contender| SLAB_CLAIM.contains(&c.name);
+        scenes.push(compared(spec.name, &trace, &contenders, wanted, seeds, watch)?);
         if let Some(trace) = spec.capture(models, side, PatternKind::Centre)? {
             let compared = compared(spec.name, &trace, &contenders, claimed, seeds, |_| ())?;
             without_antialiasing.push(compared);
@@ -283,7 +228,7 @@ fn compared(
     name: &'static str,
     trace: &Trace,
     contenders: &[Contender],
-    takes_part: impl Fn(&Contender) -> bool,
+    wanted: fn(&Contender, u32) -> bool,
     seeds: u32,
     mut progress: impl FnMut(usize),
 ) -> Result<ComparedScene> {
@@ -292,14 +237,14 @@ fn compared(
     let options = ReplayOptions { memory: 1 << 30, ..ReplayOptions::default() };
     let exact = configure(REFERENCE, &[])?;
     let mut references = Vec::new();
-    for count in COUNTS {
+    for count in COUNTS.into_iter().filter(|n| contenders.iter().any(|c| wanted(c, *n))) {
         let reference = exact.replay(trace, count, 0, &options)?.picture;
         references.push((count, reference, PixelClasses::of(trace, count)?.covered));
     }
     let mut results = Vec::new();
-    for (contender, spec) in contenders.iter().enumerate().filter(|(_, c)| takes_part(c)) {
+    for (contender, spec) in contenders.iter().enumerate() {
         progress(contender);
-        for (count, reference, covered) in &references {
+        for (count, reference, covered) in references.iter().filter(|(n, ..)| wanted(spec, *n)) {
             let design = spec.at(*count, has_opaque)?;
             let seeds = if design.promises().seeded { seeds } else { 1 };
             let mut ensemble = Ensemble::new(reference, &[covered]);
@@ -366,26 +311,5 @@ impl Comparison {
     /// The contender with a label.
     pub fn contender(&self, label: &str) -> Option<usize> {
         self.contenders.iter().position(|c| c.label == label)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_design_is_a_contender_and_all_settings_resolve() {
-        let list = contenders();
-        for entry in DESIGNS.iter().filter(|e| e.info.name != REFERENCE) {
-            assert!(list.iter().any(|c| c.label == entry.info.name));
-        }
-        for contender in &list {
-            for count in COUNTS {
-                for has_opaque in [true, false] {
-                    contender.at(count, has_opaque).unwrap();
-                }
-            }
-        }
-        assert!(list.len() > DESIGNS.len());
     }
 }
