@@ -286,6 +286,7 @@ fn print_counts(events: &EventCounts, console: &Console) -> Result<()> {
         line(&format!("  of {length}"), *n)?;
     }
     line("surfaces started", events.surfaces)?;
+    line("layers compared", events.layers_compared)?;
     let [read, written] = events.state_bytes();
     line("state bytes read", read)?;
     line("state bytes written", written)

@@ -190,8 +190,11 @@ pub(super) fn reported(
         });
     }
     let results = write_report(store, about)?;
-    for sentence in answer(&results) {
-        console.print(format_args!("{sentence}"))?;
+    // Of a part there is no answer yet.
+    if results.missing.iter().all(|m| m.why.is_some()) {
+        for sentence in answer(&results) {
+            console.print(format_args!("{sentence}"))?;
+        }
     }
     console.print(format_args!(
         "{} of {} runs; the report is {}",

@@ -235,6 +235,7 @@ impl Shown {
             pictures: self.pictures.iter().map(|kept| kept.viewed(results)).collect(),
             pixel: self.facts.pixel,
             trace: self.facts.trace.clone(),
+            seed: results.study.first_seed,
         }
     }
 }

@@ -28,6 +28,8 @@ pub trait Probe {
     fn hashed(&mut self, _count: u32) {}
     /// The fragment was written to these samples.
     fn written(&mut self, _samples: SampleMask) {}
+    /// The fragment's depth was compared with those of `count` stored layers.
+    fn compared(&mut self, _count: u32) {}
     /// State bits of the pixel were read and written.
     fn state(&mut self, _read: u32, _written: u32) {}
 }
@@ -57,6 +59,8 @@ pub struct EventCounts {
     pub sorts_by_length: Vec<u64>,
     /// New surfaces started.
     pub surfaces: u64,
+    /// Depths of stored layers that fragments were compared with.
+    pub layers_compared: u64,
     /// Bits of pixel state read.
     pub state_bits_read: u64,
     /// Bits of pixel state written.
@@ -73,6 +77,7 @@ impl Default for EventCounts {
             hashes: 0,
             sorts_by_length: vec![0; MAX_SAMPLES as usize + 1],
             surfaces: 0,
+            layers_compared: 0,
             state_bits_read: 0,
             state_bits_written: 0,
         }
@@ -85,12 +90,13 @@ impl EventCounts {
         self.sorts_by_length.iter().sum()
     }
 
-    /// Comparisons of two depths: one for each sample put to the depth test, and for each
-    /// sort those of Batcher's odd-even merge network of its length.
+    /// Comparisons of two depths: one for each sample put to the depth test, one for each
+    /// layer that a fragment is to find its place among, and for each sort those of
+    /// Batcher's odd-even merge network of its length.
     pub fn comparators(&self) -> u64 {
         let sorts = self.sorts_by_length.iter().enumerate();
         let sorting = |(length, count): (usize, &u64)| network_comparators(length) * count;
-        self.samples_tested + sorts.map(sorting).sum::<u64>()
+        self.samples_tested + self.layers_compared + sorts.map(sorting).sum::<u64>()
     }
 
     /// Bytes of pixel state read and written.
@@ -115,6 +121,7 @@ impl EventCounts {
             *sum += count;
         }
         self.surfaces += other.surfaces;
+        self.layers_compared += other.layers_compared;
         self.state_bits_read += other.state_bits_read;
         self.state_bits_written += other.state_bits_written;
     }
@@ -172,6 +179,10 @@ impl Probe for EventCounts {
         self.samples_written += u64::from(samples.count());
     }
     #[inline]
+    fn compared(&mut self, count: u32) {
+        self.layers_compared += u64::from(count);
+    }
+    #[inline]
     fn state(&mut self, read: u32, written: u32) {
         self.state_bits_read += u64::from(read);
         self.state_bits_written += u64::from(written);
@@ -199,6 +210,8 @@ pub struct Record {
     pub written: SampleMask,
     /// Hashes evaluated.
     pub hashes: u32,
+    /// Stored layers whose depths were compared with the fragment's.
+    pub layers_compared: u32,
     /// Bits of pixel state read.
     pub state_bits_read: u32,
     /// Bits of pixel state written.
@@ -256,6 +269,9 @@ impl Probe for Record {
     }
     fn written(&mut self, samples: SampleMask) {
         self.written |= samples;
+    }
+    fn compared(&mut self, count: u32) {
+        self.layers_compared += count;
     }
     fn state(&mut self, read: u32, written: u32) {
         self.state_bits_read += read;

@@ -194,6 +194,7 @@ pub fn insert<T: Deep, P: Probe>(
     // All depths are read; what lies behind the new layer moves by one.
     let moved = (held - place) as u32;
     let written = (room.min(held + 1) - place) as u32;
+    probe.compared(held as u32);
     probe.state(32 * held as u32 + (bits - 32) * moved, bits * written);
     list.insert(place, layer);
     (list.len() > room).then(|| list.pop()).flatten()

@@ -175,6 +175,7 @@ fn what_is_counted_is_what_is_explained() {
                 if let Some(order) = record.order.as_ref().filter(|order| order.len() > 1) {
                     explained.sorts_by_length[order.len()] += 1;
                 }
+                explained.layers_compared += u64::from(record.layers_compared);
                 explained.surfaces += u64::from(record.surface.is_some());
                 explained.state_bits_read += u64::from(record.state_bits_read);
                 explained.state_bits_written += u64::from(record.state_bits_written);

@@ -88,6 +88,7 @@ fn record(design: &str, rmse: f64) -> Record {
         "events": {
             "fragments": 5, "samples_tested": 6, "samples_passed": 7, "samples_written": 8,
             "hashes": u64::MAX, "sorts_by_length": [0, 0, 3], "surfaces": 9,
+            "layers_compared": 12,
             "state_bits_read": 10, "state_bits_written": 11,
         },
         "state_bits": {"samples": 512, "extra": 42, "unbounded": false}, "passes": 1,

@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use crate::param::Options;
 use crate::report::html::page::{Place, given_within};
 use crate::report::html::parts::{Cell, Content, command, figure, table};
-use crate::report::html::words::{fixed, grouped, quoted};
+use crate::report::html::words::{figures, fixed, grouped, quoted};
 use crate::study::analysis::{Cost, ROUNDING, baseline};
 
 pub(super) fn designs(content: &Content<'_>) -> Markup {
@@ -130,8 +130,8 @@ pub(super) fn method(content: &Content<'_>) -> Markup {
                 dd {
                     "RMSE divided by that of " code { (on.series) } " at " (on.samples)
                     " samples on the same scene. Over all scenes the geometric mean, so that no scene \
-                     counts more for being harder. In it an RMSE below " (ROUNDING)
-                    " counts as that much: it is rounding. Without any error the share is 0. Where one \
+                     counts more for being harder. In it an RMSE below " (figures(ROUNDING))
+                    " counts as that much, 1/√12: rounding to 8 bits makes such an error itself. Without any error the share is 0. Where one \
                      scene's result is missing there is no figure."
                 }
                 dt { "Intervals" }

@@ -55,6 +55,17 @@ fn passes(c: &Candidate<'_>) -> String {
     if c.passes == 1 { "one pass".into() } else { format!("{} passes", c.passes) }
 }
 
+/// What the choice gives up, as the end of a sentence.
+fn price(c: &Candidate<'_>) -> String {
+    let lacks = [
+        (!c.promises.unbiased, "it is biased"),
+        (!c.promises.any_order, "its picture depends on the order of fragments"),
+    ];
+    let said: Vec<String> =
+        lacks.iter().filter(|(holds, _)| *holds).map(|(_, what)| what.to_string()).collect();
+    if said.is_empty() { String::new() } else { format!("; {}", listed(&said)) }
+}
+
 /// What the answers say, in sentences. Every word follows from the numbers.
 pub(super) fn lead(content: &Content<'_>, answers: &[Answer<'_>]) -> Vec<String> {
     let find =
@@ -100,11 +111,12 @@ pub(super) fn lead(content: &Content<'_>, answers: &[Answer<'_>]) -> Vec<String>
         };
         let over = if first { format!(" {over}") } else { String::new() };
         text.push(format!(
-            "{start}, {} at {} has the least error{over}: {share}, with {} in {}. {}",
+            "{start}, {} at {} has the least error{over}: {share}, with {} in {}{}. {}",
             spelt(best.design),
             counted(best.run.samples as usize, "sample"),
             bytes(best),
             passes(best),
+            price(best),
             second(answer)
         ));
     }

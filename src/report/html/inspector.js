@@ -252,7 +252,8 @@ function inspector(element) {
     const turn = ++latest;
     const design = picture ? picture.name : 'exact';
     const command = ['screendoor', 'explain', scene.trace, '--design', design, '--samples',
-      String(scene.samples), '--pixel', `${x},${y}`].map(shellWord).join(' ');
+      String(scene.samples), '--pixel', `${x},${y}`,
+      ...(scene.seed ? ['--seed', String(scene.seed)] : [])].map(shellWord).join(' ');
     const code = make('code', {}, command);
     const tells = told(picture, x, y);
     const body = tells ? story(await explanation(picture)) : [

@@ -94,7 +94,9 @@ pub fn page(results: &Results, extras: &Extras) -> String {
     parts.push(own("convergence", "Convergence", convergence::section(&content)));
     parts.push(own("cost", "Speed and cost", cost::section(&content)));
     parts.push(own("designs", "Designs", about::designs(&content)));
-    parts.extend(given(extras, Place::Verification));
+    let again =
+        |(anchor, title, body): Part| (anchor, title, html! { (body) (content.study_command()) });
+    parts.extend(given(extras, Place::Verification).map(again));
     parts.push(own("scenes", "Scenes", about::scenes(&content)));
     parts.push(own("method", "How it was measured", about::method(&content)));
     parts.push(own("reproduce", "Machine and study", reproduce::section(&content)));

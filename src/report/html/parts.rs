@@ -177,7 +177,7 @@ impl Cell {
             Cell::Number(v, shown) => html! { td class="n" data-v=(v) { (shown) } },
             Cell::Estimate(e, decimals) => html! {
                 td class="n" data-v=(e.value) data-low=(e.low) data-high=(e.high) {
-                    (rounded(e.value, *decimals))
+                    (shown(*e, *decimals))
                     @if e.low != e.high {
                         " " span class="pm" { "±" (fixed(e.half_width(), *decimals)) }
                     }
@@ -186,6 +186,12 @@ impl Cell {
             Cell::Missing(why) => html! { td class="n none" title=(why) { "—" } },
         }
     }
+}
+
+/// An estimate's value; one that cannot be told from 0 has no more decimals than others.
+fn shown(e: Estimate, decimals: usize) -> String {
+    let may_be_none = e.low < 0.0 && e.high > 0.0;
+    if may_be_none { fixed(e.value, decimals) } else { rounded(e.value, decimals) }
 }
 
 /// A value with so many decimals; with more where it would round to 0 and is not.

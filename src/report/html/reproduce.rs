@@ -13,7 +13,7 @@ pub(super) fn section(content: &Content<'_>) -> Markup {
         }
         p class="prose" {
             "Everything but times is a pure function of the study: measured again, on whatever machine, it \
-             is the same to the last bit."
+             is the same to the last bit. Commands that name a trace run in the folder of the results."
         }
         h3 { "Traces" }
         (figure("traces", &traces(content), &html! { "BLAKE3 of each trace's content." }, &html! {}))

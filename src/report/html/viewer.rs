@@ -45,6 +45,8 @@ pub struct ViewedScene<'a> {
     pub pixel: [u16; 2],
     /// Where the trace lies, for commands.
     pub trace: String,
+    /// The pictures' seed.
+    pub seed: u32,
 }
 
 /// Style rules, for the page's head. They take the page's variables `--bg`,
@@ -220,6 +222,7 @@ fn scene_data(scene: &ViewedScene<'_>, blobs: &mut Blobs) -> Value {
         "height": height,
         "pixel": scene.pixel,
         "trace": scene.trace,
+        "seed": scene.seed,
         "pictures": pictures.collect::<Vec<_>>(),
         "reference": reference,
     })
@@ -257,6 +260,7 @@ mod tests {
             pictures: vec![viewed],
             pixel: [3, 2],
             trace: "a.arrow".into(),
+            seed: 0,
         };
         let page = element(&[scene]).into_string();
         assert!(page.contains("a &amp; b · 8 samples"));

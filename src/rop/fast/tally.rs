@@ -87,6 +87,7 @@ impl<'a, P: Probe> Tally<'a, P> {
             hashes: self.hashes,
             sorts_by_length,
             surfaces: self.surfaces,
+            layers_compared: 0,
             state_bits_read: bits(self.tested, depth_bits) + bits(self.tracked, state_bits),
             state_bits_written: bits(self.tracked, state_bits) + bits(self.written, sample_bits),
         }

@@ -39,7 +39,7 @@ impl Cost {
             Cost::Moved => "pixel state read and written for each fragment, over all passes",
             Cost::Hashes => "hashes evaluated for each fragment",
             Cost::Comparators => {
-                "depths compared for each fragment: depth tests, and the comparators of sorting \
+                "depths compared for each fragment: depth tests, layers kept, and the comparators of sorting \
                  networks"
             }
             Cost::Cpu => {
