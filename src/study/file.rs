@@ -338,6 +338,13 @@ impl SceneEntry {
             let count = self.captured_samples;
             return Err(out_of_range("captured_samples", count, "1, 2, 4, 8, 16, 32 or 64"));
         }
+        if let Some([x, y]) = self.pixel.filter(|_| self.trace.is_none()) {
+            let [width, height] = self.size;
+            if u32::from(x) >= width || u32::from(y) >= height {
+                let range = format_args!("0 to {} and 0 to {}", width - 1, height - 1);
+                return Err(out_of_range("pixel", format_args!("{x}, {y}"), range));
+            }
+        }
         if self.trace.is_none() {
             let recorded = pattern(self.pattern, self.captured_samples)?;
             let lacks = |count: &&u32| recorded.prefix(**count).is_err();
@@ -355,7 +362,7 @@ impl SceneEntry {
     }
 }
 
-fn out_of_range(key: &str, value: impl std::fmt::Display, range: &str) -> Error {
+fn out_of_range(key: &str, value: impl std::fmt::Display, range: impl std::fmt::Display) -> Error {
     Error::config(format_args!("'{key}' cannot be {value}"), format_args!("it is {range}"))
 }
 
@@ -479,6 +486,7 @@ mod tests {
             ("[4, 8]", "[]", "'samples' is empty"),
             ("'engine'", "'a/b'", "is no name for a scene"),
             ("'engine'", "'..'", "is no name for a scene"),
+            ("name = 'engine'", "name = 'engine'\npixel = [3, 512]", "'pixel' cannot be 3, 512"),
             ("name = 'engine'", "name = 'engine'\ncaptured_samples = 8", "do not serve 4"),
             ("source = 'builtin:engine'", "", "needs either a source or a trace"),
             ("name = 'a'", "name = 'a'\nseeds = 0", "'seeds' cannot be 0"),
