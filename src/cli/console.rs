@@ -67,7 +67,7 @@ impl Console {
             if self.quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
         let bar = ProgressBar::with_draw_target(Some(0), target);
         let template = format!(
-            "{{prefix}} [{{bar:30}}] {{percent:>3}} % of {{human_len}} {unit}, {{eta}} left"
+            "{{prefix}} [{{bar:30}}] {{human_pos}} of {{human_len}} {unit}, {{eta}} left"
         );
         bar.set_style(
             ProgressStyle::with_template(&template)
@@ -89,6 +89,12 @@ impl Progress {
     pub fn set(&self, done: u64, total: u64) {
         self.bar.set_length(total);
         self.bar.set_position(done);
+    }
+
+    /// Shows that `done` of `total` had been done before: no measure of the time left.
+    pub fn go_on(&self, done: u64, total: u64) {
+        self.set(done, total);
+        self.bar.reset_eta();
     }
 
     /// Shows another name for what is done.

@@ -1,6 +1,7 @@
 //! `screendoor study` and `screendoor merge`.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Args;
 
@@ -93,6 +94,7 @@ pub(super) struct Place<'a> {
 /// Measures what is missing and writes the report.
 pub(super) fn measured(store: &Store, place: Place<'_>, console: &Console) -> Result<()> {
     let progress = console.progress("measuring", "runs");
+    let has_begun = AtomicBool::new(false);
     let runner = Runner {
         store,
         base: place.base,
@@ -100,7 +102,10 @@ pub(super) fn measured(store: &Store, place: Place<'_>, console: &Console) -> Re
         adapter: place.adapter,
         watch: &|what, done, total| {
             progress.name(what);
-            progress.set(done, total);
+            match has_begun.swap(true, Ordering::Relaxed) {
+                true => progress.set(done, total),
+                false => progress.go_on(done, total),
+            }
         },
     };
     let outcome = runner.run()?;

@@ -551,11 +551,11 @@ def one_bit(text):
     return text[:found.start(2)] + packed + text[found.end(2):]
 
 
-def one_letter(text):
-    """A letter of a packed picture."""
+def letters(text):
+    """Forty letters of a packed picture, turned round: a single one may change a single pixel."""
     found = re.search(r'id="viewer-blob-1"[^>]*>(.*?)</script>', text, re.S)
     at = found.start(1) + 200
-    return text[:at] + ("A" if text[at] != "A" else "B") + text[at + 1:]
+    return text[:at] + text[at:at + 40][::-1] + text[at + 40:]
 
 
 def replaced(old, new):
@@ -568,7 +568,7 @@ def replaced(old, new):
 # What is planted, how, which checks look at it, and which of them must fail.
 PLANTS = [
     ("one bit of one pixel", one_bit, on_desk(check_values), "values of "),
-    ("one letter of a packed picture", one_letter, on_desk(check_opens, check_values), "nothing failed to decode|values of "),
+    ("letters of a packed picture", letters, on_desk(check_opens, check_values), "nothing failed to decode|values of "),
     ("an error on the console", replaced("</body>", "<script>console.error('planted')</script></body>"),
      on_desk(check_opens), "the console stays empty"),
     ("a picture from the network", replaced("</body>", "<img src='http://127.0.0.1:9/a.png' alt=''></body>"),

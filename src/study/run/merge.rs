@@ -115,5 +115,9 @@ fn copy(from: &Store, to: &Store, path: &Path) -> Result<()> {
     };
     let mut file = OutputFile::create(&target)?;
     io::copy(&mut source, &mut file).map_err(|e| Error::io("write", &target, e))?;
-    file.commit()
+    file.commit()?;
+    // A record's time is when it was measured. Where it cannot be kept nothing else is lost.
+    let time = source.metadata().and_then(|m| m.modified());
+    let _ = time.and_then(|t| File::options().append(true).open(&target)?.set_modified(t));
+    Ok(())
 }
