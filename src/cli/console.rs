@@ -66,9 +66,8 @@ impl Console {
         let target =
             if self.quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
         let bar = ProgressBar::with_draw_target(Some(0), target);
-        let template = format!(
-            "{{prefix}} [{{bar:30}}] {{human_pos}} of {{human_len}} {unit}, {{eta}} left"
-        );
+        let template =
+            format!("{{prefix}} [{{bar:30}}] {{human_pos}} of {{human_len}} {unit}, {{eta}} left");
         bar.set_style(
             ProgressStyle::with_template(&template)
                 .unwrap_or_else(|_| ProgressStyle::default_bar())
