@@ -403,7 +403,7 @@ def check_inspector(page, check, folder):
     page.press("x")
     page.driver.execute_async_script("setTimeout(arguments[0], 100)")
     command = page.script("return document.querySelector('.inspector code').textContent")
-    name = page.pictures()[0]
+    name = page.pictures()[0].replace("reference", "exact")
     wanted = f"screendoor explain {scene['trace']} --design {name} --samples {scene['samples']} --pixel 3,5"
     check("any other pixel has its command", command == wanted, command)
     page.driver.execute_cdp_cmd("Browser.grantPermissions", {"permissions": ["clipboardReadWrite", "clipboardSanitizedWrite"]})
