@@ -20,7 +20,7 @@ use arrow_schema::{Field, Schema};
 use screendoor::capture::{Capture, CaptureOptions};
 use screendoor::trace::{Header, Trace, WriteOptions};
 
-use crate::util::{header, random_fragments, trace_bytes};
+use crate::util::{endlessly_scaled, header, random_fragments, trace_bytes};
 
 /// A hostile file: its name, its bytes, what the error must say.
 struct Hostile {
@@ -405,7 +405,8 @@ fn scenes() -> Vec<Hostile> {
             j["nodes"] = serde_json::json!([{}]);
         }),
         edited("nowhere.gltf", "no finite place", "a transformation to infinity", |j| {
-            j["nodes"][0]["scale"] = serde_json::json!([1e39, 1.0, 1.0]);
+            j["nodes"] = endlessly_scaled(serde_json::json!({ "mesh": 0 }));
+            j["scenes"][0]["nodes"] = serde_json::json!([0]);
         }),
         edited(
             "extension.gltf",

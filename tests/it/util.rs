@@ -162,3 +162,10 @@ pub fn gpu() -> Option<&'static Gpu> {
         }
     }
 }
+
+/// Nodes of a glTF file, each within the one before and as large as a number there can make
+/// it, the last of them `leaf`: together too large for double precision.
+pub fn endlessly_scaled(leaf: serde_json::Value) -> serde_json::Value {
+    let outer = |i: usize| serde_json::json!({ "scale": [3e38, 1.0, 1.0], "children": [i + 1] });
+    (0..9).map(outer).chain([leaf]).collect()
+}

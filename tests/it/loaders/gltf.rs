@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 
 use super::{folder, load_in, png, warned};
 use crate::hostile;
+use crate::util::endlessly_scaled;
 
 /// A glTF scene of one textured triangle, changed by `edit`.
 fn gltf(edit: impl Fn(&mut Value)) -> Result<Scene, Error> {
@@ -85,8 +86,10 @@ fn findings_of_the_library_are_errors_of_one_line() {
                   export the file again";
     assert!(error.ends_with(wanted), "{error}");
     let error = gltf(|j| {
-        j["nodes"][0]["name"] = "a\nb".into();
-        j["nodes"][0]["scale"] = json!([1e39, 1, 1]);
+        let mut leaf = j["nodes"][0].clone();
+        leaf["name"] = "a\nb".into();
+        j["nodes"] = endlessly_scaled(leaf);
+        j["scenes"][0]["nodes"] = json!([0]);
     });
     let error = error.unwrap_err().to_string();
     assert!(error.contains("object 'a b'") && !error.contains('\n'), "{error}");
