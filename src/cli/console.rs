@@ -86,14 +86,13 @@ pub(super) struct Progress {
 impl Progress {
     /// Shows that `done` of `total` is done.
     pub fn set(&self, done: u64, total: u64) {
+        let begins = self.bar.length() == Some(0);
         self.bar.set_length(total);
         self.bar.set_position(done);
-    }
-
-    /// Shows that `done` of `total` had been done before: no measure of the time left.
-    pub fn go_on(&self, done: u64, total: u64) {
-        self.set(done, total);
-        self.bar.reset_eta();
+        if begins {
+            // What had been done before is no measure of the time left.
+            self.bar.reset_eta();
+        }
     }
 
     /// Shows another name for what is done.

@@ -1,12 +1,10 @@
 //! `screendoor study` and `screendoor merge`.
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Args;
 
 use crate::cli::console::{Console, shown};
-use crate::design::configure;
 use crate::error::{Error, Result};
 use crate::output::OutputFile;
 use crate::param::Options;
@@ -94,7 +92,6 @@ pub(super) struct Place<'a> {
 /// Measures what is missing and writes the report.
 pub(super) fn measured(store: &Store, place: Place<'_>, console: &Console) -> Result<()> {
     let progress = console.progress("measuring", "runs");
-    let has_begun = AtomicBool::new(false);
     let runner = Runner {
         store,
         base: place.base,
@@ -102,10 +99,7 @@ pub(super) fn measured(store: &Store, place: Place<'_>, console: &Console) -> Re
         adapter: place.adapter,
         watch: &|what, done, total| {
             progress.name(what);
-            match has_begun.swap(true, Ordering::Relaxed) {
-                true => progress.set(done, total),
-                false => progress.go_on(done, total),
-            }
+            progress.set(done, total);
         },
     };
     let outcome = runner.run()?;
@@ -182,11 +176,11 @@ pub(super) fn reported(
     console: &Console,
 ) -> Result<Results> {
     let study = store.study();
-    let mut about = About { designs: Vec::new(), command: String::new() };
-    about.command = command
+    let command = command
         .unwrap_or_else(|| format!("screendoor study study.toml -o {}", store.folder().display()));
+    let mut about = About { designs: Vec::new(), command };
     for series in &study.designs {
-        let design = configure(&series.replace("{n}", "8").replace("{2n}", "16"), &[])?;
+        let design = study.design(series, 8)?;
         about.designs.push(DesignText {
             series: series.clone(),
             summary: design.info().summary.to_string(),

@@ -146,8 +146,10 @@ impl Pictures {
         let left_out = designs.len().saturating_sub(most);
         designs.truncate(most);
         let mut scenes = Vec::new();
-        for samples in &study.pictures {
-            for facts in &results.scenes {
+        let mut counts = study.pictures.clone();
+        counts.sort_unstable();
+        for facts in &results.scenes {
+            for samples in &counts {
                 let of_scene = |r: &&Record| {
                     r.scene == facts.name
                         && r.samples == *samples
@@ -157,9 +159,6 @@ impl Pictures {
                 scenes.extend(Shown::read(store, facts, *samples, &records)?);
             }
         }
-        // The scenes as the study has them, each with all of its sample counts.
-        let place = |s: &Shown| study.scenes.iter().position(|e| e.name == s.facts.name);
-        scenes.sort_by_key(|s| (place(s), s.samples));
         Ok(Pictures { scenes, left_out })
     }
 

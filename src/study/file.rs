@@ -9,6 +9,7 @@ use crate::capture::{CameraOptions, CaptureOptions, Faces, Order, PatternKind, p
 use crate::design::{Configured, configure};
 use crate::error::{Error, Result};
 use crate::param::Options;
+use crate::rop::ReplayOptions;
 use crate::study::engine::EngineName;
 use crate::trace::{MAX_SIDE, SamplePattern};
 
@@ -232,6 +233,11 @@ impl Study {
         let spec =
             series.replace("{n}", &samples.to_string()).replace("{2n}", &(2 * samples).to_string());
         configure(&spec, &[])
+    }
+
+    /// How its traces are replayed.
+    pub fn replay_options(&self) -> ReplayOptions<'static> {
+        ReplayOptions { memory: self.memory << 20, ..ReplayOptions::default() }
     }
 
     /// The publications to measure: each once, and none that is part of another.

@@ -12,8 +12,8 @@ use crate::metrics::{
 };
 use crate::param::Options;
 use crate::picture::Picture;
-use crate::rop::{OrderPromise, ReplayOptions, Replayed};
-use crate::study::engine::{Engine, EngineName};
+use crate::rop::{EventCounts, OrderPromise, ReplayOptions, Replayed, StateBits, Which};
+use crate::study::engine::{Engine, EngineName, OnGpu};
 use crate::study::file::{Metric, Study};
 use crate::study::record::{Filtered, FlipOverSeeds, Promised, Record, SpectrumOverSeeds, Speed};
 use crate::study::run::scene::{OpenScene, Reference, Watch};
@@ -45,8 +45,8 @@ pub(super) fn measure(
     let promises = design.promises();
     let seeds = if promises.seeded { study.seeds } else { 1 };
     watch(&format!("{} at {} on {}", design.label(), job.samples, scene.facts.name));
-    let (seen, first) = run.over(seeds).map_err(|e| e.to_string())?;
-    let counted = run.counted().map_err(|e| e.to_string())?;
+    let (seen, first, counted) = run.over(seeds).map_err(|e| e.to_string())?;
+    let picture = first.hash();
     let [frame, covered, interior, edges] = seen.ensemble;
     let record = Record {
         id: job.id.clone(),
@@ -74,12 +74,12 @@ pub(super) fn measure(
         flip: seen.flip,
         flip_hdr: seen.flip_hdr,
         spectrum: seen.spectrum,
-        events: counted.events.unwrap_or_default(),
+        events: counted.events,
         state_bits: counted.state_bits,
         passes: counted.passes,
         touched_tiles: counted.touched_tiles as u64,
-        picture: first.hash(),
-        speed: run.speed(engines, &first),
+        speed: run.speed(engines, &picture),
+        picture,
     };
     // What is not finite would be lost in the file, and no later run would know why.
     let text = serde_json::to_string(&record).map_err(|e| e.to_string())?;
@@ -96,6 +96,26 @@ struct Run<'a> {
     scene: &'a OpenScene,
     reference: &'a Reference,
     design: &'a Configured,
+}
+
+/// What a replay tells beside its picture.
+struct Counted {
+    events: EventCounts,
+    state_bits: StateBits,
+    passes: u32,
+    touched_tiles: usize,
+}
+
+impl Counted {
+    /// `None` where no events were counted.
+    fn of(replayed: &Replayed) -> Option<Self> {
+        Some(Counted {
+            events: replayed.events.clone()?,
+            state_bits: replayed.state_bits,
+            passes: replayed.passes,
+            touched_tiles: replayed.touched_tiles,
+        })
+    }
 }
 
 /// What is seen of one seed's picture.
@@ -118,46 +138,46 @@ struct SeenOverSeeds {
 }
 
 impl Run<'_> {
-    fn options(&self) -> ReplayOptions<'static> {
-        ReplayOptions { memory: self.study.memory << 20, ..ReplayOptions::default() }
+    fn replay(&self, engine: &Engine, seed: u32, count: bool) -> Result<(Replayed, Option<OnGpu>)> {
+        let options = ReplayOptions { count_events: count, ..self.study.replay_options() };
+        let seed = self.study.first_seed + seed;
+        engine.replay(self.design, &self.scene.trace, self.reference.samples, seed, &options)
     }
 
-    fn replay(&self, seed: u32) -> Result<Picture> {
-        let first = self.study.first_seed;
-        let (trace, samples) = (&self.scene.trace, self.reference.samples);
-        let replayed =
-            self.first.replay(self.design, trace, samples, first + seed, &self.options())?;
-        Ok(replayed.0.picture)
-    }
-
-    /// The first seed with its events counted. GPUs count none: the processor's fast engine
-    /// does, and draws the same.
-    fn counted(&self) -> Result<Replayed> {
-        let options = ReplayOptions { count_events: true, ..self.options() };
-        let (trace, samples) = (&self.scene.trace, self.reference.samples);
-        self.design.replay(trace, samples, self.study.first_seed, &options)
+    /// The first seed's picture, and what was counted. GPUs count nothing: the processor's
+    /// fast engine does, and draws the same.
+    fn first(&self) -> Result<(Picture, Counted)> {
+        let first = self.replay(self.first, 0, true)?.0;
+        match Counted::of(&first) {
+            Some(counted) => Ok((first.picture, counted)),
+            None => {
+                let again = self.replay(&Engine::Cpu(Which::Fast), 0, true)?.0;
+                Ok((first.picture, Counted::of(&again).expect("it was asked to count")))
+            }
+        }
     }
 
     /// Replays all seeds; a batch's pictures are looked at side by side.
-    fn over(&self, seeds: u32) -> Result<(SeenOverSeeds, Picture)> {
+    fn over(&self, seeds: u32) -> Result<(SeenOverSeeds, Picture, Counted)> {
         let reference = self.reference;
         let classes = &reference.classes;
         let regions = [&reference.frame, &classes.covered, &classes.interior, &classes.edges];
         let mut ensemble = Ensemble::new(&reference.picture, &regions);
+        let (first, counted) = self.first()?;
         let mut seen = Vec::new();
-        let mut first = None;
         let batch = rayon::current_num_threads().max(1);
         let all: Vec<u32> = (0..seeds).collect();
         for batch in all.chunks(batch) {
-            let pictures =
-                batch.iter().map(|seed| self.replay(*seed)).collect::<Result<Vec<_>>>()?;
+            let picture = |seed: &u32| match seed {
+                0 => Ok(first.clone()),
+                _ => Ok(self.replay(self.first, *seed, false)?.0.picture),
+            };
+            let pictures = batch.iter().map(picture).collect::<Result<Vec<_>>>()?;
             pictures.iter().for_each(|picture| ensemble.add(picture));
             seen.par_extend(pictures.par_iter().map(|picture| self.see(picture)));
-            first = first.or_else(|| pictures.into_iter().next());
         }
         let ensemble = ensemble.finish().try_into().expect("one for each region");
-        let first = first.expect("a study has a seed");
-        Ok((together(ensemble, &seen), first))
+        Ok((together(ensemble, &seen), first, counted))
     }
 
     fn see(&self, picture: &Picture) -> Seen {
@@ -180,7 +200,7 @@ impl Run<'_> {
 
     /// Times every engine, one after the other in each round, so that what is compared is
     /// measured at about the same time.
-    fn speed(&self, engines: &Engines, expected: &Picture) -> BTreeMap<String, Speed> {
+    fn speed(&self, engines: &Engines, expected: &str) -> BTreeMap<String, Speed> {
         if self.study.timing == 0 {
             return BTreeMap::new();
         }
@@ -204,20 +224,18 @@ impl Run<'_> {
         &self,
         engine: &Engine,
         timed: &mut Timed,
-        expected: &Picture,
+        expected: &str,
         is_warming_up: bool,
     ) -> Result<(), String> {
         if matches!(engine, Engine::Gpu(..)) && !self.design.is_ported() {
             return Err("no port to GPUs".to_string());
         }
-        let (trace, samples) = (&self.scene.trace, self.reference.samples);
         let start = Instant::now();
-        let replayed =
-            engine.replay(self.design, trace, samples, self.study.first_seed, &self.options());
+        let replayed = self.replay(engine, 0, false);
         let seconds = start.elapsed().as_secs_f64();
         let (replayed, gpu) = replayed.map_err(|e| e.to_string())?;
         if is_warming_up {
-            timed.same_bits = Some(replayed.picture.hash() == expected.hash());
+            timed.same_bits = Some(replayed.picture.hash() == expected);
             return Ok(());
         }
         timed.seconds.push(seconds);

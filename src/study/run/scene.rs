@@ -8,9 +8,8 @@ use crate::error::{Error, Result};
 use crate::metrics::{Flip, PixelClasses, Region};
 use crate::output::OutputFile;
 use crate::picture::Picture;
-use crate::rop::ReplayOptions;
 use crate::scene;
-use crate::study::file::{Metric, SceneEntry};
+use crate::study::file::{Metric, SceneEntry, Study};
 use crate::study::results::SceneFacts;
 use crate::study::run::store::Store;
 use crate::study::throughput::work;
@@ -56,12 +55,15 @@ impl OpenScene {
         let facts = facts(store, index, &trace, shown, watch)?;
         let all = trace.header().pattern.samples();
         watch(&format!("{REFERENCE} at {all} on {}", entry.name));
-        let options =
-            ReplayOptions { memory: store.study().memory << 20, ..ReplayOptions::default() };
-        let fine = configure(REFERENCE, &[])?.replay(&trace, all, 0, &options)?.picture;
+        let fine = exact(store.study(), &trace, all)?;
         let fine_covered = PixelClasses::of(&trace, all)?.covered;
         Ok(OpenScene { trace, facts, fine, fine_covered })
     }
+}
+
+fn exact(study: &Study, trace: &Trace, samples: u32) -> Result<Picture> {
+    let design = configure(REFERENCE, &[])?;
+    Ok(design.replay(trace, samples, 0, &study.replay_options())?.picture)
 }
 
 /// Draws a scene into the trace at `path`.
@@ -193,8 +195,7 @@ impl Reference {
         let picture = if samples == trace.header().pattern.samples() {
             scene.fine.clone()
         } else {
-            let options = ReplayOptions { memory: study.memory << 20, ..ReplayOptions::default() };
-            configure(REFERENCE, &[])?.replay(trace, samples, 0, &options)?.picture
+            exact(study, trace, samples)?
         };
         let seen = [Metric::Flip, Metric::FlipHdr].iter().any(|m| study.takes(*m));
         Ok(Reference {
