@@ -71,21 +71,17 @@ impl Error {
 
     /// An [`Error::Invalid`] at `place`.
     pub fn invalid(place: impl Display, what: impl Display, hint: impl Display) -> Self {
-        Error::Invalid { place: place.to_string(), what: what.to_string(), hint: hint.to_string() }
+        Error::Invalid { place: place.to_string(), what: one_line(what), hint: one_line(hint) }
     }
 
     /// An [`Error::Unsupported`] at `place`.
     pub fn unsupported(place: impl Display, what: impl Display, hint: impl Display) -> Self {
-        Error::Unsupported {
-            place: place.to_string(),
-            what: what.to_string(),
-            hint: hint.to_string(),
-        }
+        Error::Unsupported { place: place.to_string(), what: one_line(what), hint: one_line(hint) }
     }
 
     /// An [`Error::Gpu`] of `adapter`.
     pub fn gpu(adapter: impl Display, what: impl Display, hint: impl Display) -> Self {
-        Error::Gpu { adapter: adapter.to_string(), what: what.to_string(), hint: hint.to_string() }
+        Error::Gpu { adapter: adapter.to_string(), what: one_line(what), hint: one_line(hint) }
     }
 
     /// An [`Error::Config`].
@@ -115,9 +111,24 @@ impl Error {
     }
 }
 
+/// What libraries and files say, fit for one line: each run of line breaks, tabs and other
+/// control characters becomes a space.
+pub(crate) fn one_line(text: impl Display) -> String {
+    let text = text.to_string();
+    let words: Vec<&str> = text.split(char::is_control).filter(|w| !w.is_empty()).collect();
+    if words.len() < 2 { words.concat() } else { words.join(" ") }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_libraries_say_in_several_lines_becomes_one() {
+        let error = Error::invalid("a.arrow", "unaligned.\n\twhile verifying\n\n", "replace it");
+        assert_eq!(error.to_string(), "a.arrow: unaligned. while verifying; replace it");
+        assert_eq!(one_line("as  it is"), "as  it is");
+    }
 
     #[test]
     fn an_unknown_name_suggests_the_nearest() {

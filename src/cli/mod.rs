@@ -14,6 +14,7 @@ mod report;
 mod reproduce;
 mod scenes;
 mod signals;
+mod stress;
 mod study;
 mod throughput;
 mod verify;
@@ -57,6 +58,7 @@ enum Command {
     Throughput(throughput::Arguments),
     Verify(verify::Arguments),
     Reproduce(reproduce::Arguments),
+    Stress(stress::Arguments),
 }
 
 /// Parses the process's arguments and runs the command.
@@ -98,5 +100,6 @@ fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         Command::Throughput(a) => throughput::run(a, console),
         Command::Verify(a) => verify::run(a, console),
         Command::Reproduce(a) => reproduce::run(a, console),
+        Command::Stress(a) => stress::run(a, console),
     }
 }

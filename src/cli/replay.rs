@@ -128,6 +128,13 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         }
     };
     drop(progress);
+    match first.picture.not_finite() {
+        0 => {}
+        n => console.warn(&format!(
+            "{n} pixels are NaN or infinite: sums of '{}' in single precision have overflowed",
+            design.label()
+        )),
+    }
 
     // No file appears unless all could be written.
     let saved = write_pictures(&mut files, &first.picture, reference.as_ref())

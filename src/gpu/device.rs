@@ -143,6 +143,12 @@ impl Gpu {
         Ok(Gpu { device, queue, adapter, fault, pipelines: Mutex::default() })
     }
 
+    /// Gives the device up, as if the card had been taken out: whatever is asked of it from
+    /// now on is an error. For trying what happens then.
+    pub fn lose(&self) {
+        self.device.destroy();
+    }
+
     /// What it says about itself.
     pub fn adapter(&self) -> &Adapter {
         &self.adapter

@@ -122,9 +122,19 @@ impl Picture {
 
     /// How many of its pixels have a channel that is NaN or infinite.
     pub fn not_finite(&self) -> u64 {
-        let finite = |x, y| self.get(x, y).iter().all(|c| c.is_finite());
-        let row = |y| (0..self.width()).filter(|x| !finite(*x, y)).count() as u64;
-        (0..self.height()).map(row).sum()
+        let grid = self.grid();
+        let broken = |colour: &[f64; 3]| !colour.iter().all(|c| c.is_finite());
+        let touched = self.tiles.touched().iter().flat_map(|(id, tile)| {
+            let pixels = tile.iter().enumerate();
+            pixels.filter(|(within, _)| grid.contains(grid.pixel(*id, *within))).map(|(_, c)| c)
+        });
+        let (mut count, mut seen) = (0, 0);
+        for colour in touched {
+            count += u64::from(broken(colour));
+            seen += 1;
+        }
+        let all = u64::from(self.width()) * u64::from(self.height());
+        count + if broken(&self.background) { all - seen } else { 0 }
     }
 
     /// The BLAKE3 of all pixels' bits, row by row: equal for pictures that are
@@ -149,6 +159,22 @@ impl Picture {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pixels_that_are_not_finite_are_counted() {
+        let grid = TileGrid::new(20, 10);
+        let mut picture = Picture::new(grid, [0.5; 3]);
+        assert_eq!(picture.not_finite(), 0);
+        // The tile reaches beyond the frame; what lies there is nobody's.
+        let tile = grid.tile(19, 9);
+        picture.tile_mut(tile).fill([0.0, f64::NAN, 0.0]);
+        let expected = Picture::from_fn(grid, |x, y| picture.get(x, y)).not_finite();
+        let within = (0..TILE_PIXELS).filter(|i| grid.contains(grid.pixel(tile, *i))).count();
+        assert_eq!((picture.not_finite(), expected), (within as u64, within as u64));
+        assert!(within < TILE_PIXELS);
+        let infinite = Picture::new(grid, [f64::INFINITY, 0.0, 0.0]);
+        assert_eq!(infinite.not_finite(), 200);
+    }
 
     #[test]
     fn untouched_tiles_show_the_background() {

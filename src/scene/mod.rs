@@ -441,11 +441,6 @@ pub fn load(source: &str) -> Result<Scene> {
     Ok(scene)
 }
 
-/// A text of a file fit for one line of a message or a name.
-fn one_line(text: &str) -> String {
-    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
-}
-
 /// The name under which a file appears in traces: without its folders, so that a
 /// trace does not depend on where its scene lay.
 fn file_name(path: &Path) -> String {

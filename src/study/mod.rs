@@ -10,6 +10,7 @@ pub mod publications;
 pub mod record;
 pub mod results;
 pub mod run;
+pub mod stress;
 pub mod throughput;
 
 use std::time::Instant;

@@ -456,6 +456,11 @@ fn corpus() -> Vec<Hostile> {
     traces().into_iter().chain(scenes()).collect()
 }
 
+/// Names and bytes of all files of the corpus.
+pub fn files() -> impl Iterator<Item = (&'static str, Vec<u8>)> {
+    corpus().into_iter().map(|h| (h.name, h.bytes))
+}
+
 /// Does with a file what a user would; the error.
 fn open(path: &Path) -> Result<(), screendoor::error::Error> {
     if path.extension().is_some_and(|e| e == "arrow") {

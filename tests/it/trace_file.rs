@@ -178,7 +178,7 @@ fn no_truncation_or_splice_passes_and_none_panics() {
 }
 
 /// The same trace as another program would write it: plain Arrow IPC, no seal.
-fn unsealed(header: &Header, fragments: &[Fragment], compression: Compression) -> Vec<u8> {
+pub fn unsealed(header: &Header, fragments: &[Fragment], compression: Compression) -> Vec<u8> {
     use arrow_array::RecordBatch;
     use arrow_ipc::CompressionType;
     use arrow_ipc::reader::FileReader;

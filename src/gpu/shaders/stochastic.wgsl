@@ -129,11 +129,22 @@ fn inner_end_pass(number: u32) {
     sums_store();
 }
 
-// box_filter of src/resolve/mod.rs. Samples are a power of two: the product is exact.
+// box_filter of src/resolve/mod.rs. Samples are a power of two: products with their share
+// are exact.
 fn resolve_pixel() -> vec3<f32> {
+    let share = 1.0 / f32(SAMPLES);
     var sum = vec3<f32>(0.0);
     for (var s = 0u; s < SAMPLES; s++) {
         sum += state_colour(AT_COLOUR + 3u * s);
     }
-    return sum * (1.0 / f32(SAMPLES));
+    // All bits of the exponent: it has overflowed. Compilers take floats for finite.
+    let overflowed = (bitcast<vec3<u32>>(sum) & vec3<u32>(0x7f800000u)) == vec3<u32>(0x7f800000u);
+    if !any(overflowed) {
+        return sum * share;
+    }
+    var shares = vec3<f32>(0.0);
+    for (var s = 0u; s < SAMPLES; s++) {
+        shares += state_colour(AT_COLOUR + 3u * s) * share;
+    }
+    return select(sum * share, shares, overflowed);
 }

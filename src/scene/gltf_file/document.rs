@@ -6,8 +6,7 @@ use std::path::Path;
 use gltf::json::validation::{Checked, Error as Invalid};
 use gltf::{Document, Semantic, json};
 
-use crate::error::{Error, Result};
-use crate::scene::one_line;
+use crate::error::{Error, Result, one_line};
 
 /// The bytes before the first chunk of a GLB file.
 const GLB_HEADER: usize = 12;

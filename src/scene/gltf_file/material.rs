@@ -5,8 +5,8 @@ use std::borrow::Cow;
 use glam::{Affine2, Vec2, Vec3, Vec4};
 
 use super::Loader;
-use crate::error::Result;
-use crate::scene::{AlphaMode, Material, Texture, TextureUse, Wrap, one_line};
+use crate::error::{Result, one_line};
+use crate::scene::{AlphaMode, Material, Texture, TextureUse, Wrap};
 
 impl Loader<'_> {
     pub(super) fn material(&mut self, material: &gltf::Material<'_>) -> Result<usize> {

@@ -12,8 +12,8 @@ use std::path::{Component, Path, PathBuf};
 use base64::Engine as _;
 use glam::{DAffine3, DMat4};
 
-use crate::error::{Error, Result};
-use crate::scene::{Object, Scene, Wrap, file, file_name, one_line};
+use crate::error::{Error, Result, one_line};
+use crate::scene::{Object, Scene, Wrap, file, file_name};
 
 /// The deepest nesting of nodes.
 const MAX_DEPTH: usize = 256;

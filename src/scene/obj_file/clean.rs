@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 
 use super::lines::{Lines, Statement, shown};
 use super::mtl::Library;
-use crate::error::{Error, Result};
-use crate::scene::{Scene, one_line};
+use crate::error::{Error, Result, one_line};
+use crate::scene::Scene;
 
 /// A run of faces of one name and one material; each becomes an object that
 /// `tobj` knows by its number.

@@ -4,8 +4,8 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 
-use crate::error::{Error, Result};
-use crate::scene::{file, one_line};
+use crate::error::{Error, Result, one_line};
+use crate::scene::file;
 
 /// The longest statement, in bytes.
 const MAX_BYTES: u64 = 1 << 24;

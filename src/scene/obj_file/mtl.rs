@@ -10,9 +10,9 @@ use std::path::{Path, PathBuf};
 use glam::{Vec3, Vec4};
 
 use super::lines::{Lines, Statement};
-use crate::error::Result;
+use crate::error::{Result, one_line};
 use crate::scene::texture::Encoding;
-use crate::scene::{AlphaMode, Material, Scene, Texture, TextureUse, one_line};
+use crate::scene::{AlphaMode, Material, Scene, Texture, TextureUse};
 
 /// The materials that an OBJ file's MTL files define.
 ///

@@ -60,8 +60,8 @@ fn mutate(bytes: &[u8], random: &mut Stream) -> Vec<u8> {
     bytes
 }
 
-#[test]
-fn damaged_files_load_or_give_one_error() {
+/// Good files, each of which says much of what its format can.
+pub fn good_files() -> Vec<(&'static str, Vec<u8>)> {
     let mtl = b"newmtl m\nKd 1 .5 0\nKe 0 0 1\nd .5\nmap_Kd -s 1 1 1 a.png\nmap_d a.png\nnewmtl n\nTr 0\n";
     let text = "mtllib a.mtl\no a\nv 0 0 0\nv 1 0 0\nv 0 1 0 1\nv 1 1 0\nvt 0 0\nvt 1 0\nvn 0 0 1\n\
                 usemtl m\nf 1/1/1 2/2/1 3/1/1\ng b\nusemtl n\nf -4//1 -3//1 -2//1 -1//1\nl 1 2\n";
@@ -96,17 +96,23 @@ fn damaged_files_load_or_give_one_error() {
     let packed = vdb::Written { packing: 6, half: true, ..vdb::full() }.bytes();
     let zipped = vdb::Written { packing: 3, tile: Some(0.5), ..vdb::full() }.bytes();
     let splats = splats::splats(&[[0x1234_5678, 0x4567_89ab, 0x89ab_cdef, 0xffee_ddcc]; 20]);
-    let good: [(&str, &[u8]); 9] = [
-        ("a.tfx", &hair),
-        ("a.ply", &splats),
-        ("b.vdb", &packed),
-        ("c.vdb", &zipped),
-        ("a.obj", text.as_bytes()),
-        ("a.mtl", mtl),
-        ("a.png", &image),
-        ("a.gltf", &full),
-        ("a.glb", &glb),
-    ];
+    vec![
+        ("a.tfx", hair),
+        ("a.ply", splats),
+        ("b.vdb", packed),
+        ("c.vdb", zipped),
+        ("a.obj", text.into()),
+        ("a.mtl", mtl.to_vec()),
+        ("a.png", image),
+        ("a.gltf", full),
+        ("a.glb", glb),
+    ]
+}
+
+#[test]
+fn damaged_files_load_or_give_one_error() {
+    let files = good_files();
+    let good: Vec<(&str, &[u8])> = files.iter().map(|(name, bytes)| (*name, &bytes[..])).collect();
     let folder = folder(&good);
     for name in ["a.obj", "a.gltf", "a.glb", "a.tfx", "a.ply", "b.vdb", "c.vdb"] {
         load_in(folder.path(), name).unwrap_or_else(|e| panic!("{name}: {e}"));
@@ -115,7 +121,7 @@ fn damaged_files_load_or_give_one_error() {
     let rounds: u32 =
         std::env::var("SCREENDOOR_MUTATIONS").ok().and_then(|n| n.parse().ok()).unwrap_or(80);
     let mut failed = 0;
-    for (kind, (name, bytes)) in good.into_iter().enumerate() {
+    for (kind, (name, bytes)) in good.iter().copied().enumerate() {
         let scene = if name.ends_with(".mtl") || name.ends_with(".png") { "a.obj" } else { name };
         for round in 0..rounds {
             let damaged = mutate(bytes, &mut Stream::new([kind as u32, round]));

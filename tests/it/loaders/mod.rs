@@ -1,6 +1,6 @@
 //! What scene files of other programs say, and what is read from them.
 
-mod damage;
+pub mod damage;
 mod gltf;
 mod obj;
 mod splats;

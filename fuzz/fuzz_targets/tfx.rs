@@ -1,0 +1,6 @@
+#![no_main]
+
+#[path = "../../tests/it/inputs.rs"]
+mod inputs;
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| inputs::take("tfx", bytes));
