@@ -5,18 +5,17 @@
 /// (another program cut it, its disk failed): that is told as an error like any other.
 #[cfg(unix)]
 pub(super) fn clean_up() {
-    use signal_hook::consts::{SIGBUS, SIGHUP, SIGINT, SIGTERM};
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGUSR2};
     use signal_hook::iterator::Signals;
 
     // Who started the program may have it ignore some (nohup): that stands.
     let heeded = [SIGHUP, SIGINT, SIGTERM].into_iter().filter(|signal| !is_ignored(*signal));
     // Without a handler, files stay behind, and nothing else is lost.
-    let Ok(mut signals) = Signals::new(heeded.chain([SIGBUS])) else { return };
+    let Ok(mut signals) = Signals::new(heeded.chain([SIGUSR2])) else { return };
     let watch = move || {
         for signal in signals.forever() {
             crate::output::abandon_all();
-            if signal == SIGBUS {
-                // The thread that reads gets no further; it tries again until this ends it.
+            if bus::HAS_FAILED.load(std::sync::atomic::Ordering::SeqCst) {
                 eprintln!(
                     "screendoor: error: a file that is being read was cut or cannot be read any \
                      more; leave it as it is while it is read, or restore a copy"
@@ -26,7 +25,43 @@ pub(super) fn clean_up() {
             let _ = signal_hook::low_level::emulate_default_handler(signal);
         }
     };
-    let _ = std::thread::Builder::new().name("signals".to_string()).spawn(watch);
+    if std::thread::Builder::new().name("signals".to_string()).spawn(watch).is_ok() {
+        bus::report();
+    }
+}
+
+/// What to do where memory that a file is mapped to cannot be read (SIGBUS).
+#[cfg(unix)]
+mod bus {
+    use std::sync::atomic::{AtomicBool, Ordering};
+
+    pub(super) static HAS_FAILED: AtomicBool = AtomicBool::new(false);
+
+    /// Has the thread that watches for signals end the process. Not by `signal_hook`, which
+    /// also calls the handler that was there before: the standard library's ends the process
+    /// at once.
+    pub(super) fn report() {
+        // SAFETY: the handler is one; all that it does is safe in one.
+        unsafe {
+            let mut action: libc::sigaction = std::mem::zeroed();
+            action.sa_sigaction = handler as extern "C" fn(libc::c_int) as libc::sighandler_t;
+            action.sa_flags = libc::SA_ONSTACK;
+            libc::sigemptyset(&raw mut action.sa_mask);
+            libc::sigaction(libc::SIGBUS, &raw const action, std::ptr::null_mut());
+        }
+    }
+
+    extern "C" fn handler(_signal: libc::c_int) {
+        HAS_FAILED.store(true, Ordering::SeqCst);
+        // SAFETY: both may be called in a handler.
+        unsafe {
+            libc::kill(libc::getpid(), libc::SIGUSR2);
+            // There is nothing to go back to.
+            loop {
+                libc::pause();
+            }
+        }
+    }
 }
 
 #[cfg(unix)]

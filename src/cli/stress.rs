@@ -4,13 +4,14 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use crate::cli::console::{Console, shown};
+use crate::cli::console::{Console, shown, table};
 use crate::cli::files::{Json, report};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::output::OutputFile;
+use crate::param::Options;
 use crate::report::stability;
-use crate::study::stress::{Plan, stress};
+use crate::study::stress::{Group, Outcome, Plan, Stability, stress};
 
 /// Try every design and engine on hard cases, and write what comes of it
 #[derive(Debug, Args)]
@@ -18,6 +19,10 @@ pub(super) struct Arguments {
     /// Write the tables, as Markdown
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
+    /// Only the designs: no hostile files and no faults, for which the program is run again
+    /// and again
+    #[arg(long)]
+    designs_only: bool,
     /// Seeds of each design that has any
     #[arg(long, default_value_t = 16, value_name = "K", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(2..=1000))]
     seeds: u32,
@@ -30,18 +35,21 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
-    let gpu = match (Gpu::open(arguments.adapter.as_deref()), &arguments.adapter) {
-        (Ok(gpu), _) => Some(gpu),
-        (Err(error), Some(_)) => return Err(error),
+    let open = || match (Gpu::open(arguments.adapter.as_deref()), &arguments.adapter) {
+        (Ok(gpu), _) => Ok(Some(gpu)),
+        (Err(error), Some(_)) => Err(error),
         (Err(error), None) => {
             console.warn(&format!("no GPU is tried: {error}"));
-            None
+            Ok(None)
         }
     };
     let json = Json::open(&arguments.json)?;
     let progress = console.progress("trying", "cases");
+    let program = std::env::current_exe().map_err(|e| Error::io("find", "this program", e))?;
+    let output = arguments.output.as_ref().map(OutputFile::create).transpose()?;
     let plan = Plan {
-        gpu: gpu.as_ref(),
+        program: (!arguments.designs_only).then_some(&program),
+        gpu: &open,
         seeds: arguments.seeds,
         progress: &|what, done, total| {
             progress.name(what);
@@ -50,9 +58,60 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     };
     let found = stress(&plan)?;
     drop(progress);
-    if let Some(path) = &arguments.output {
-        OutputFile::put(path, stability(&found).as_bytes())?;
-        console.print(format_args!("{}", shown(path.display())))?;
+    if let Some(mut file) = output {
+        let command = "cargo run --release -- stress -o docs/STABILITY.md";
+        file.write_bytes(stability(&found, command)?.as_bytes())?;
+        file.commit()?;
     }
-    report(json, &found, console, || Ok(()))
+    report(json, &found, console, || print(&found, arguments, console))?;
+    for broken in found.broken() {
+        console.error(&Error::config(broken, "this is a fault of screendoor: report it"));
+    }
+    Ok(())
+}
+
+/// What came of it, in a table of groups.
+fn print(found: &Stability, arguments: &Arguments, console: &Console) -> Result<()> {
+    let mut rows = Vec::new();
+    for (group, choice) in Group::ALL.iter().zip(Group::CHOICES) {
+        let of_group = |case: &str| found.cases.iter().any(|c| c.name == case && c.group == *group);
+        let own: Vec<&Outcome> =
+            found.findings.iter().filter(|f| of_group(&f.case)).map(|f| &f.outcome).collect();
+        let count = |of: fn(&Outcome) -> bool| own.iter().filter(|o| of(o)).count().to_string();
+        rows.push(vec![
+            choice.name.to_string(),
+            own.len().to_string(),
+            count(|o| matches!(o, Outcome::Exact)),
+            count(|o| matches!(o, Outcome::Within { .. })),
+            count(|o| matches!(o, Outcome::Degraded { .. })),
+            count(|o| matches!(o, Outcome::NotFinite { .. })),
+            count(|o| matches!(o, Outcome::Refused { .. })),
+        ]);
+    }
+    let head = ["cases", "results", "exact", "within", "degraded", "not finite", "refused"];
+    console.print(format_args!("{}", table(&head, rows)))?;
+    for claim in &found.claims {
+        let held = if claim.held { "refused" } else { "NOT HELD" };
+        console.print(format_args!(
+            "{held} in {:.0} ms and {:.0} MiB: {}",
+            claim.seconds * 1e3,
+            claim.bytes as f64 / f64::from(1 << 20),
+            claim.what
+        ))?;
+    }
+    for fault in &found.faults {
+        console.print(format_args!(
+            "{}: {} tries, {} times the work was done, {} times it ended otherwise with nothing \
+             lost, {} failures",
+            fault.name,
+            fault.tries,
+            fault.done,
+            fault.survived,
+            fault.failures.len()
+        ))?;
+    }
+    if let Some(path) = &arguments.output {
+        console.print(format_args!("the tables are in {}", shown(path.display())))?;
+    }
+    Ok(())
 }

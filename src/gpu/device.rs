@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::fmt;
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 use serde::Serialize;
 
@@ -70,6 +71,9 @@ pub struct Gpu {
     fault: Arc<Mutex<Option<Fault>>>,
     pipelines: Mutex<HashMap<(String, String), wgpu::ComputePipeline>>,
 }
+
+/// How long a device may take to say why it failed.
+const PATIENCE: Duration = Duration::from_secs(5);
 
 /// What went wrong.
 #[derive(Clone, Debug)]
@@ -176,8 +180,9 @@ impl Gpu {
 
     /// Why memory could not be reached: what went wrong on the device, if it knows.
     fn failed(&self, doing: &str, why: &dyn fmt::Display) -> Error {
-        // A device tells that it is lost when it is asked.
-        let polled = self.device.poll(wgpu::PollType::Poll);
+        // A device tells that it is lost when it is asked, and when its last work is over.
+        let wait = wgpu::PollType::Wait { submission_index: None, timeout: Some(PATIENCE) };
+        let polled = self.device.poll(wait);
         let cause = self.check(doing).err();
         cause.unwrap_or_else(|| match polled {
             Err(e) => self.error(format_args!("{doing} failed: {e}"), "try again"),

@@ -142,9 +142,10 @@ fn resolve_pixel() -> vec3<f32> {
     if !any(overflowed) {
         return sum * share;
     }
+    // A driver may otherwise take the share out of the sum again.
     var shares = vec3<f32>(0.0);
     for (var s = 0u; s < SAMPLES; s++) {
-        shares += state_colour(AT_COLOUR + 3u * s) * share;
+        shares += rounded3(state_colour(AT_COLOUR + 3u * s) * share);
     }
     return select(sum * share, shares, overflowed);
 }

@@ -4,37 +4,52 @@ use std::fmt::Write;
 
 use crate::param::Options;
 use crate::report::markdown_table;
-use crate::report::stability::short;
+use crate::report::stability::{in_cell, short};
 use crate::study::stress::{Facts, Finding, Group, Outcome, SIGNIFICANCE, Series, Stability};
 
 pub(super) fn text(text: &mut String, found: &Stability) {
-    let results = found.findings.len();
     let count = |of: fn(&Outcome) -> bool| found.findings.iter().filter(|f| of(&f.outcome)).count();
     let _ = writeln!(
         text,
         "## Hard cases\n\n\
-         {} designs on {} cases: {} exact, {} within the stated bound, {} degraded, {} refused, {} \
-         with pixels that are not finite, which the replay announces. {} promises are broken.\n",
+         {} designs on {} cases, {} results: {} exact, {} within the stated bound, {} degraded, {} \
+         refused, {} with pixels that are not finite.\n",
         found.series.len(),
         found.cases.len(),
+        found.findings.len(),
         count(|o| matches!(o, Outcome::Exact)),
         count(|o| matches!(o, Outcome::Within { .. })),
         count(|o| matches!(o, Outcome::Degraded { .. })),
         count(|o| matches!(o, Outcome::Refused { .. })),
         count(|o| matches!(o, Outcome::NotFinite { .. })),
-        found.broken().count()
     );
-    let _ = results;
     let _ = writeln!(
         text,
-        "Engines: {}. Every picture is held against the plain text's of the same seed.\n",
-        found.engines.join(", ")
+        "The truth is composited sample by sample in double precision with compensated sums. An \
+         error is a share of what the pixel's contributions come to without their signs, the worst \
+         channel of the worst kind of pixel.\n\n\
+         | cell | meaning |\n|---|---|\n\
+         | = | every pixel of every seed is the truth to the last bit of single precision |\n\
+         | ≤ e | off by e, within what rounding to single precision may come to there |\n\
+         | ± n | the mean over pixels and seeds is within what chance and rounding allow; n is the \
+         noise, the root mean square of single pixels' errors |\n\
+         | off e, off e ± n | degraded: the mean is off by e, beyond that bound |\n\
+         | **not finite** | sums overflow; the replay warns, a study puts the run down as missing |\n\
+         | refused (i) | the design says why it cannot: message i |\n\n\
+         Designs that are random are measured over {} seeds (8 where a case has more than 2^17 \
+         fragments); their bounds are crossed by chance alone anywhere in the table with a \
+         probability of {} (Student's t, Bonferroni). What is promised to be unbiased and is off is \
+         a broken promise, and so is an engine that differs.\n",
+        found.seeds, SIGNIFICANCE
     );
-    let _ = SIGNIFICANCE;
+    engines(text, found);
     let mut messages = Vec::new();
     for (group, choice) in Group::ALL.iter().zip(Group::CHOICES) {
         let cases: Vec<&Facts> = found.cases.iter().filter(|c| c.group == *group).collect();
-        let _ = writeln!(text, "### {}: {}\n", choice.name, choice.help);
+        if cases.is_empty() {
+            continue;
+        }
+        let _ = writeln!(text, "### {}\n\n{}:\n", sentence(choice.name), sentence(choice.help));
         for case in &cases {
             let _ = writeln!(text, "- **{}**: {}", case.name, case.what);
         }
@@ -45,13 +60,50 @@ pub(super) fn text(text: &mut String, found: &Stability) {
             found.series.iter().map(|s| row(found, s, &cases, &mut messages)).collect();
         text.push_str(&markdown_table(&head, &rows));
         text.push('\n');
+        if *group == Group::Order {
+            cost(text, found, &cases);
+        }
     }
     for (i, message) in messages.iter().enumerate() {
         let _ = writeln!(text, "{}. {message}", i + 1);
     }
-    for (finding, why) in found.broken() {
-        let _ = writeln!(text, "- broken: {} on {}: {why}", finding.design, finding.case);
+    if !messages.is_empty() {
+        text.push('\n');
     }
+}
+
+fn sentence(text: &str) -> String {
+    let mut chars = text.chars();
+    chars.next().map_or_else(String::new, |c| c.to_uppercase().chain(chars).collect())
+}
+
+/// How the engines agree.
+fn engines(text: &mut String, found: &Stability) {
+    let all = found.findings.iter().flat_map(|f| &f.engines);
+    let on = |gpu: bool| all.clone().filter(move |a| (a.engine == "gpu") == gpu);
+    let same = |gpu: bool| on(gpu).filter(|a| a.difference == Some(0.0)).count();
+    let _ = write!(
+        text,
+        "Engines on this machine: {}. Of {} pictures of the processor's engines {} are the plain \
+         text's bit for bit.",
+        found.engines.join(", "),
+        on(false).count(),
+        same(false)
+    );
+    if on(true).next().is_some() {
+        let most = on(true).filter_map(|a| a.difference).fold(0.0, f64::max);
+        let refused = on(true).filter(|a| a.refused.is_some()).count();
+        let _ = write!(
+            text,
+            " Of {} on the GPU {} are, {} are refused, and the others differ by {} of one plus the \
+             value at most.",
+            on(true).count(),
+            same(true),
+            refused,
+            short(most)
+        );
+    }
+    text.push_str("\n\n");
 }
 
 fn row(
@@ -77,7 +129,7 @@ fn cell(finding: &Finding, seeded: bool, messages: &mut Vec<String>) -> String {
             format!("off {} ± {}", short(*error), short(*noise))
         }
         Outcome::Degraded { error, .. } => format!("off {}", short(*error)),
-        Outcome::NotFinite { pixels } => format!("{pixels} not finite"),
+        Outcome::NotFinite { .. } => "**not finite**".to_string(),
         Outcome::Refused { message } => {
             let known = messages.iter().position(|m| m == message);
             let number = known.unwrap_or_else(|| {
@@ -87,4 +139,60 @@ fn cell(finding: &Finding, seeded: bool, messages: &mut Vec<String>) -> String {
             format!("refused ({})", number + 1)
         }
     }
+}
+
+/// What misleading orders cost: noise as a multiple of that of the same fragments in the
+/// order that is expected.
+fn cost(text: &mut String, found: &Stability, cases: &[&Facts]) {
+    let misled: Vec<(&&Facts, &str)> = cases.iter().filter_map(|c| Some((c, c.against?))).collect();
+    let noise = |case: &str, design: &str| match found.finding(case, design)?.outcome {
+        Outcome::Within { noise, .. } | Outcome::Degraded { noise, .. } if noise > 0.0 => {
+            Some(noise)
+        }
+        _ => None,
+    };
+    let mut rows = Vec::new();
+    for series in found.series.iter().filter(|s| s.seeded) {
+        let cells: Vec<String> = misled
+            .iter()
+            .map(|(case, against)| {
+                let both = noise(&case.name, &series.name).zip(noise(against, &series.name));
+                both.map_or("—".to_string(), |(misled, expected)| {
+                    format!("{:.2}", misled / expected)
+                })
+            })
+            .collect();
+        rows.push([vec![format!("`{}`", series.name)], cells].concat());
+    }
+    if rows.is_empty() {
+        return;
+    }
+    text.push_str(
+        "What that costs: the noise of the misleading order, as a multiple of the noise of the same \
+         fragments surface by surface (— where one of them has none).\n\n",
+    );
+    let head: Vec<&str> =
+        std::iter::once("design").chain(misled.iter().map(|(c, _)| c.name.as_str())).collect();
+    text.push_str(&markdown_table(&head, &rows));
+    text.push('\n');
+}
+
+pub(super) fn unfit(text: &mut String, found: &Stability) {
+    text.push_str(
+        "## What no trace may hold\n\n\
+         One rule: alpha is in [0, 1], colours are finite, a fragment covers at least one sample and \
+         none that does not exist. Nothing is clamped in silence: a value outside is refused when it \
+         is written and, since other programs write traces too, when it is read, with its row.\n\n",
+    );
+    let rows: Vec<Vec<String>> = found
+        .unfit
+        .iter()
+        .map(|u| {
+            let said =
+                u.written.as_deref().map_or("taken".to_string(), |m| format!("refused: {m}"));
+            vec![u.what.to_string(), in_cell(&said)]
+        })
+        .collect();
+    text.push_str(&markdown_table(&["value", "what happens"], &rows));
+    text.push('\n');
 }

@@ -55,7 +55,7 @@ impl Statement {
 
 /// The beginning of a text, as messages show it.
 pub(super) fn shown(text: &str) -> String {
-    one_line(&text.chars().take(SHOWN).collect::<String>())
+    one_line(text.chars().take(SHOWN).collect::<String>())
 }
 
 /// Reads a file statement by statement.

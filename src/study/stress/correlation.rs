@@ -10,11 +10,9 @@ use crate::error::Result;
 use crate::param::Options;
 use crate::picture::Picture;
 use crate::rop::{PixelIndex, Reference, ReferenceKey, ReplayOptions};
+use crate::study::stress::SIGNIFICANCE;
 use crate::study::stress::case::{Case, Group, layer};
 use crate::trace::Trace;
-
-/// The chance that any correlation of the whole table is called one by chance alone.
-pub const SIGNIFICANCE: f64 = 1e-3;
 
 /// Distances that are tried: between numbers of surfaces, seeds and pixels.
 const LAGS: [u32; 4] = [1, 2, 3, 8];

@@ -43,7 +43,7 @@ pub struct Fault {
 }
 
 impl Fault {
-    fn new(name: &'static str, what: &'static str) -> Self {
+    pub(crate) fn new(name: &'static str, what: &'static str) -> Self {
         let said = String::new();
         Fault { name, what, tries: 0, done: 0, survived: 0, said, failures: Vec::new() }
     }

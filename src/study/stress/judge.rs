@@ -8,7 +8,8 @@ use crate::picture::Picture;
 use crate::study::stress::case::Case;
 use crate::study::stress::truth::{Truth, truth};
 
-/// The chance that any bound on any mean of the whole suite is crossed by chance alone.
+/// The chance that any bound of a whole table, on means or on correlations, is crossed by
+/// chance alone.
 pub const SIGNIFICANCE: f64 = 1e-3;
 
 /// How close a design's pictures come to the truth. Errors are shares of the scale of a

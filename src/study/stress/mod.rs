@@ -10,12 +10,18 @@ mod judge;
 mod truth;
 mod unfit;
 
+use std::path::Path;
+
 use rayon::prelude::*;
 use serde::Serialize;
 
 pub use case::{Case, Facts, Group};
 pub use cases::cases;
+pub use claims::{Claim, MOST_BYTES, MOST_SECONDS};
+pub use correlation::{Between, Correlation, CorrelationRow};
+pub use faults::Fault;
 pub use judge::{Outcome, SIGNIFICANCE};
+pub use unfit::Unfit;
 
 use crate::design::{Configured, DESIGNS, configure};
 use crate::error::Result;
@@ -43,11 +49,13 @@ const EXTREMES: [&str; 10] = [
 /// What is tried.
 #[derive(Clone, Copy)]
 pub struct Plan<'a> {
-    /// A GPU, for the designs that have a port to it.
-    pub gpu: Option<&'a Gpu>,
+    /// The program's own file, to be run under faults; without it they are left out.
+    pub program: Option<&'a Path>,
+    /// Opens a GPU, for the designs that have a port to it, if there is one.
+    pub gpu: &'a dyn Fn() -> Result<Option<Gpu>>,
     /// Seeds of each design that has any; at least 2.
     pub seeds: u32,
-    /// Is told what is measured, how many of how many.
+    /// Is told what is tried, how many of how many.
     pub progress: &'a (dyn Fn(&str, u64, u64) + Sync),
 }
 
@@ -56,6 +64,8 @@ pub struct Plan<'a> {
 pub struct Stability {
     /// Seeds of each design that has any.
     pub seeds: u32,
+    /// Values that no trace may hold.
+    pub unfit: Vec<Unfit>,
     /// The cases.
     pub cases: Vec<Facts>,
     /// The designs.
@@ -64,6 +74,14 @@ pub struct Stability {
     pub engines: Vec<String>,
     /// What was found, case by case, and of each design by design.
     pub findings: Vec<Finding>,
+    /// Correlations of reference values, by hash.
+    pub hashes: Vec<CorrelationRow>,
+    /// Correlations of pictures, by design.
+    pub pictures: Vec<CorrelationRow>,
+    /// Files that claim what they do not hold.
+    pub claims: Vec<Claim>,
+    /// Faults of the system.
+    pub faults: Vec<Fault>,
 }
 
 /// A design of the suite.
@@ -106,9 +124,24 @@ pub struct Agreement {
 }
 
 impl Stability {
-    /// What was promised and not kept.
-    pub fn broken(&self) -> impl Iterator<Item = (&Finding, &str)> {
-        self.findings.iter().filter_map(|f| Some((f, f.broken.as_deref()?)))
+    /// What was promised and not kept, in words.
+    pub fn broken(&self) -> Vec<String> {
+        let designs = self.findings.iter().filter_map(|f| {
+            Some(format!("{} on '{}': {}", f.design, f.case, f.broken.as_deref()?))
+        });
+        let unfit = self.unfit.iter().filter(|u| !u.held);
+        let unfit = unfit.map(|u| match &u.written {
+            Some(message) => format!("{} is refused: {message}", u.what),
+            None => format!("{} is taken", u.what),
+        });
+        let claims = self.claims.iter().filter(|c| !c.held).map(|c| {
+            format!("{} ({}): {:.3} s, {} bytes, {}", c.file, c.what, c.seconds, c.bytes, c.message)
+        });
+        let faults = self
+            .faults
+            .iter()
+            .flat_map(|f| f.failures.iter().map(|failure| format!("{}: {failure}", f.name)));
+        designs.chain(unfit).chain(claims).chain(faults).collect()
     }
 
     /// What a design makes of a case.
@@ -117,37 +150,67 @@ impl Stability {
     }
 }
 
-/// Tries every design on every case with every engine.
+/// Tries every design on every case with every engine, and the program under faults.
 ///
 /// # Errors
-/// Where a case makes no trace or a design's name is unknown; what a design refuses is a
-/// finding.
+/// Where a case makes no trace, a design's name is unknown, or the program cannot be run;
+/// what a design refuses is a finding.
 pub fn stress(plan: &Plan<'_>) -> Result<Stability> {
+    let told = |what: &str| (plan.progress)(what, 0, 1);
+    told("false claims");
+    // First: a process begins with the memory that this one had at most.
+    let claims = plan.program.map_or(Ok(Vec::new()), claims::claims)?;
+    told("faults");
+    let gpu = (plan.gpu)()?;
+    let faults = plan.program.map_or(Ok(Vec::new()), |p| faults::faults(p, gpu.is_some()))?;
     let designs = designs()?;
     let cases = cases();
+    let findings = findings(plan, gpu.as_ref(), &designs, &cases)?;
+    told("correlations");
+    let random: Vec<Configured> = designs.iter().filter(|d| d.promises().seeded).cloned().collect();
+    Ok(Stability {
+        seeds: plan.seeds,
+        unfit: unfit::unfit()?,
+        cases: cases.iter().map(Case::facts).collect(),
+        series: designs.iter().map(series).collect(),
+        engines: engines(gpu.as_ref()),
+        findings,
+        hashes: correlation::hashes(),
+        pictures: correlation::pictures(&random)?,
+        claims,
+        faults,
+    })
+}
+
+/// What every design makes of every case.
+fn findings(
+    plan: &Plan<'_>,
+    gpu: Option<&Gpu>,
+    designs: &[Configured],
+    cases: &[Case],
+) -> Result<Vec<Finding>> {
     let seeded = designs.iter().filter(|d| d.promises().seeded).count();
     let tests = seeded * 3 * cases.iter().map(|c| c.kinds.len()).sum::<usize>();
-    let engines = engines(plan);
     let total = cases.len() as u64;
     let mut findings = Vec::new();
     for (i, case) in cases.iter().enumerate() {
         (plan.progress)(&case.name, i as u64, total);
-        let trial = Trial { case, trace: case.trace()?, judge: Judge::new(case, tests)?, plan };
-        let found: Vec<Finding> = designs.par_iter().map(|design| trial.finding(design)).collect();
-        findings.extend(found);
+        let trial = Trial {
+            case,
+            trace: case.trace()?,
+            judge: Judge::new(case, tests)?,
+            seeds: plan.seeds,
+        };
+        let mut found: Vec<Finding> = designs.par_iter().map(|d| trial.finding(d)).collect();
         // One after the other: there is one device.
-        for (finding, design) in findings.iter_mut().rev().zip(designs.iter().rev()) {
-            trial.on_gpu(design, finding);
+        for (finding, design) in found.iter_mut().zip(designs) {
+            if let Some(gpu) = gpu.filter(|_| design.is_ported()) {
+                trial.on_gpu(gpu, design, finding);
+            }
         }
+        findings.extend(found);
     }
-    (plan.progress)("hard cases", total, total);
-    Ok(Stability {
-        seeds: plan.seeds,
-        cases: cases.iter().map(Case::facts).collect(),
-        series: designs.iter().map(series).collect(),
-        engines,
-        findings,
-    })
+    Ok(findings)
 }
 
 fn designs() -> Result<Vec<Configured>> {
@@ -166,8 +229,8 @@ fn others() -> impl Iterator<Item = (Which, &'static str)> {
     all.filter(|(which, _)| *which != Which::Reference && which.level().is_ok())
 }
 
-fn engines(plan: &Plan<'_>) -> Vec<String> {
-    let gpu = plan.gpu.map(|gpu| gpu.adapter().to_string());
+fn engines(gpu: Option<&Gpu>) -> Vec<String> {
+    let gpu = gpu.map(|gpu| gpu.adapter().to_string());
     let plain = Which::CHOICES[Which::Reference as usize].name.to_string();
     [plain].into_iter().chain(others().map(|(_, name)| name.to_string())).chain(gpu).collect()
 }
@@ -177,7 +240,7 @@ struct Trial<'a> {
     case: &'a Case,
     trace: Trace,
     judge: Judge<'a>,
-    plan: &'a Plan<'a>,
+    seeds: u32,
 }
 
 impl Trial<'_> {
@@ -212,8 +275,8 @@ impl Trial<'_> {
             Err(e) => return refused(e),
         };
         let seeds = match design.promises().seeded {
-            true if self.case.is_light() => self.plan.seeds,
-            true => self.plan.seeds.min(8),
+            true if self.case.is_light() => self.seeds,
+            true => self.seeds.min(8),
             false => 1,
         };
         let rest = (1..seeds).map(|seed| self.picture(design, Which::Fast, seed));
@@ -223,8 +286,7 @@ impl Trial<'_> {
         }
     }
 
-    fn on_gpu(&self, design: &Configured, finding: &mut Finding) {
-        let Some(gpu) = self.plan.gpu.filter(|_| design.is_ported()) else { return };
+    fn on_gpu(&self, gpu: &Gpu, design: &Configured, finding: &mut Finding) {
         let options = GpuOptions::default();
         let replayed = design.replay_on(gpu, &self.trace, self.case.samples, 0, &options);
         let plain = self.picture(design, Which::Reference, 0);
