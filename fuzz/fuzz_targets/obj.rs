@@ -3,4 +3,6 @@
 #[path = "../../tests/it/inputs.rs"]
 mod inputs;
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| inputs::take("obj", bytes));
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
+    inputs::named("obj").take(bytes);
+});

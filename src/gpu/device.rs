@@ -202,7 +202,10 @@ impl Gpu {
                 "close other programs, choose fewer samples, or do without the GPU",
             )),
             Some(Fault::Lost(why)) => Err(self.error(
-                format_args!("it was lost ({doing}): {why}"),
+                match why.as_str() {
+                    "" => format!("it was lost ({doing})"),
+                    why => format!("it was lost ({doing}): {why}"),
+                },
                 "try again; if it happens again, look at the system's log and its driver",
             )),
             Some(Fault::Other(why)) => Err(self.error(

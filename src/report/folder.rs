@@ -74,7 +74,7 @@ fn publications(store: &Store) -> Result<Vec<Section>> {
             read_json::<Vec<Against>>(&store.against_file(publication))?.unwrap_or_default(),
         );
     }
-    if store.study().publications.is_empty() {
+    if against.is_empty() && missing.is_empty() {
         return Ok(sections);
     }
     let mut summary = verification::summary(&against);

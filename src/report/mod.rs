@@ -11,7 +11,7 @@ mod stability;
 pub use folder::{About, PAGE, write_report};
 pub use montage::{Panel, montage};
 pub use results::{Against, Agreement, Document, FIGURES, Figure, PARTS, document, results};
-pub use stability::{sections as stability_sections, stability};
+pub use stability::stability;
 
 /// A Markdown table; columns of numbers stand to the right.
 pub fn markdown_table(header: &[&str], rows: &[Vec<String>]) -> String {

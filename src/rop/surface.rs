@@ -139,6 +139,14 @@ mod tests {
     }
 
     #[test]
+    fn the_counter_goes_on_at_0_after_2_to_the_32_surfaces() {
+        let mut tracker = SurfaceTracker { surface_id: u32::MAX, ..SurfaceTracker::default() };
+        tracker.hold(SampleMask(0b0011), 2);
+        let entered = tracker.enter(SurfaceRule::Bitmask, SampleMask(0b0110), &fragment(0, 0));
+        assert_eq!((entered, tracker.surface_id), ((0, true), 0));
+    }
+
+    #[test]
     fn other_rules_start_surfaces_at_changes() {
         let run = |rule, fragments: [(u32, u32, u64); 3]| {
             let mut tracker = SurfaceTracker::default();

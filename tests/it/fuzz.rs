@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 
 use screendoor::picture::{Layer, Picture, write_exr};
 use screendoor::tile::TileGrid;
-use screendoor::trace::{Compression, WriteOptions};
+use screendoor::trace::{Compression, Trace, WriteOptions};
 
 use crate::hostile;
-use crate::inputs::INPUTS;
+use crate::inputs::{INPUTS, named};
 use crate::loaders::damage::good_files;
 use crate::trace_file::unsealed;
 use crate::util::{header, random_fragments, trace_bytes};
@@ -68,6 +68,7 @@ fn seeds() -> Vec<(&'static str, String, Vec<u8>)> {
         }
     }
     let study = |file: &str| fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join(file)).unwrap();
+    add("trace", "unaligned-footer", unaligned());
     add("study", "default", study("src/study/default.toml"));
     add("study", "small", study("workflow/small.toml"));
     add("study", "none", Vec::new());
@@ -78,6 +79,31 @@ fn seeds() -> Vec<(&'static str, String, Vec<u8>)> {
     write_exr(&path, &[Layer { name: "colour", picture: &picture }]).unwrap();
     add("picture", "a.exr", fs::read(path).unwrap());
     seeds
+}
+
+/// A trace whose footer the library cannot read, which it says in several lines: a bit of
+/// it is flipped until that is so.
+fn unaligned() -> Vec<u8> {
+    let header = header(20, 20, 8);
+    let good = unsealed(&header, &random_fragments(&header, 9, 8), Compression::None);
+    let flipped = (good.len() - 4096.min(good.len())..good.len()).flat_map(|at| {
+        let good = &good;
+        (0..8).map(move |bit| {
+            let mut bytes = good.clone();
+            bytes[at] ^= 1 << bit;
+            bytes
+        })
+    });
+    let mut unaligned = flipped.filter(|bytes| {
+        Trace::from_bytes(bytes.clone(), "a")
+            .is_err_and(|e| e.to_string().contains("while verifying"))
+    });
+    unaligned.next().expect("some bit does it")
+}
+
+#[test]
+fn errors_of_several_lines_become_one() {
+    assert!(!named("trace").take(&unaligned()));
 }
 
 #[test]

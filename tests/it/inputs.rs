@@ -34,6 +34,14 @@ pub const INPUTS: [Input; 9] = [
     Input { name: "picture", take: picture },
 ];
 
+/// The one of that name.
+///
+/// # Panics
+/// Where there is none.
+pub fn named(name: &str) -> Input {
+    *INPUTS.iter().find(|input| input.name == name).expect("a target's name")
+}
+
 impl Input {
     /// Takes the bytes as the program would. Returns whether they were good.
     ///
@@ -45,13 +53,6 @@ impl Input {
         let text = error.to_string();
         assert!(!text.is_empty() && !text.contains('\n'), "{}: {text:?}", self.name);
         false
-    }
-}
-
-/// The input `name`, given to a fuzz target's bytes.
-pub fn take(name: &str, bytes: &[u8]) {
-    if let Some(input) = INPUTS.iter().find(|input| input.name == name) {
-        input.take(bytes);
     }
 }
 

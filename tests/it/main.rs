@@ -19,6 +19,7 @@ mod layers;
 mod loaders;
 mod models;
 mod python;
+mod stress;
 mod trace_file;
 mod unbiased;
 mod util;

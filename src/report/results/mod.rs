@@ -19,7 +19,7 @@ pub use figures::{FIGURES, Figure};
 use crate::metrics::Estimate;
 use crate::param::Options;
 use crate::picture::Picture;
-use crate::report::markdown_table;
+use crate::report::{markdown_table, stability};
 use crate::study::file::Publication;
 use crate::study::publications::methods::Methods;
 use crate::study::publications::{Publications, Reproduced};
@@ -54,6 +54,7 @@ pub fn document(measured: &Reproduced, folder: &str) -> Document {
         }
         Reproduced::Slab(c) => (slab::text(c), vec![slab::against(c)], Vec::new()),
         Reproduced::Comparison(c) => (comparison::text(c), vec![slab::against(c)], Vec::new()),
+        Reproduced::Stability(s) => (stability::sections(s), Vec::new(), Vec::new()),
     };
     Document { markdown, against, figures }
 }

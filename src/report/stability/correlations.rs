@@ -22,7 +22,7 @@ pub(super) fn text(text: &mut String, found: &Stability) {
     text.push_str(
         "The same of the pictures of designs that are random, one layer of alpha 0.3 at 8 samples: \
          drawn as the pixels' second and as their third surface, with two seeds, and pixels that lie \
-         beside each other.\n\n",
+         beside each other (— where pictures have no noise).\n\n",
     );
     table(text, "design", &found.pictures, &Between::ALL.map(|b| (b, true)));
 }
@@ -47,7 +47,8 @@ fn table(text: &mut String, what: &str, rows: &[CorrelationRow], columns: &[(Bet
 
 fn cell(c: &Correlation) -> String {
     // A minus as wide as a digit, and no sign where there is nothing.
-    let r = format!("{:.3}", c.r.abs());
-    let sign = if c.r < 0.0 && r != "0.000" { "−" } else { "" };
+    let Some(value) = c.r else { return "—".to_string() };
+    let r = format!("{:.3}", value.abs());
+    let sign = if value < 0.0 && r != "0.000" { "−" } else { "" };
     if c.correlated { format!("**{sign}{r}**") } else { format!("{sign}{r}") }
 }

@@ -34,7 +34,7 @@ pub fn stability(found: &Stability, command: &str) -> Result<String> {
 }
 
 /// Its sections, each under a heading `##`.
-pub fn sections(found: &Stability) -> String {
+pub(in crate::report) fn sections(found: &Stability) -> String {
     let mut text = String::new();
     cases::text(&mut text, found);
     cases::unfit(&mut text, found);

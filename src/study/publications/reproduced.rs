@@ -7,6 +7,7 @@ use crate::study::comparison::{Comparison, compare, compare_slab};
 use crate::study::file::Publication;
 use crate::study::publications::methods::{Methods, methods};
 use crate::study::publications::{Effort, Publications, reproduce};
+use crate::study::stress::{Stability, stress_designs};
 
 /// What was measured of a publication.
 #[derive(Debug)]
@@ -19,6 +20,8 @@ pub enum Reproduced {
     Slab(Box<Comparison>),
     /// [`Publication::Comparison`].
     Comparison(Box<Comparison>),
+    /// [`Publication::Stability`].
+    Stability(Box<Stability>),
 }
 
 impl Reproduced {
@@ -29,6 +32,7 @@ impl Reproduced {
             Reproduced::Methods(_) => Publication::Methods,
             Reproduced::Slab(_) => Publication::Slab,
             Reproduced::Comparison(_) => Publication::Comparison,
+            Reproduced::Stability(_) => Publication::Stability,
         }
     }
 
@@ -36,7 +40,7 @@ impl Reproduced {
     pub fn missing(&self) -> &[&'static str] {
         match self {
             Reproduced::LaineKarras(p) => &p.missing,
-            Reproduced::Methods(_) => &[],
+            Reproduced::Methods(_) | Reproduced::Stability(_) => &[],
             Reproduced::Slab(c) | Reproduced::Comparison(c) => &c.missing,
         }
     }
@@ -46,7 +50,7 @@ impl Reproduced {
 /// `progress` is told what runs.
 ///
 /// # Errors
-/// As [`reproduce`], [`methods`] and [`compare`].
+/// As [`reproduce`], [`methods`], [`compare`] and [`stress_designs`].
 pub fn measure_publication(
     publication: Publication,
     models: Option<&Path>,
@@ -65,5 +69,6 @@ pub fn measure_publication(
         Publication::Comparison => {
             Reproduced::Comparison(Box::new(compare(models, side, seeds, progress)?))
         }
+        Publication::Stability => Reproduced::Stability(Box::new(stress_designs(8, progress)?)),
     })
 }

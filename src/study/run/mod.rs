@@ -8,6 +8,7 @@ mod store;
 mod tasks;
 
 use std::fs;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 pub use measure::SIGMAS;
@@ -15,7 +16,7 @@ pub use merge::merge;
 pub use store::{Store, read_json};
 pub use tasks::{Job, Shard, Task, jobs, tasks};
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, one_line};
 use crate::picture::{Layer, Picture, write_exr};
 use crate::rop::Site;
 use crate::study::engine::EngineName;
@@ -94,7 +95,7 @@ impl Runner<'_> {
         for job in pending {
             let done = (outcome.measured + outcome.there + outcome.failed.len()) as u64;
             let watch = |what: &str| (self.watch)(what, done, tasks.len() as u64);
-            match self.one(job, &engines, &mut open, &watch) {
+            match guarded(|| self.one(job, &engines, &mut open, &watch)) {
                 Ok(()) => outcome.measured += 1,
                 Err(Failure::Fatal(error)) => return Err(error),
                 Err(Failure::Run(why)) => {
@@ -163,6 +164,22 @@ impl Runner<'_> {
     }
 }
 
+/// A panic within a run is a fault of that run: the others go on.
+fn guarded(
+    run: impl FnOnce() -> std::result::Result<(), Failure>,
+) -> std::result::Result<(), Failure> {
+    // What a run changes outside of itself are files, which appear whole or not at all, and
+    // the open scene, which is replaced as a whole.
+    catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|panic| {
+        let text = panic.downcast_ref::<&str>().copied();
+        let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+        Err(Failure::Run(format!(
+            "a thread panicked: {}; this is a fault of screendoor: report it",
+            one_line(text.unwrap_or("no reason is given"))
+        )))
+    })
+}
+
 /// Why a run has no result.
 enum Failure {
     /// Nor would the others: the disk is full, say.
@@ -220,5 +237,20 @@ impl Open {
             }
         };
         Ok((scene, self.reference.insert(reference)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_that_panics_is_a_run_that_failed() {
+        // In a thread of the pool, as replays do.
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+        let found = guarded(|| pool.install(|| panic!("index {} is\nout of bounds", 7)));
+        let Err(Failure::Run(why)) = found else { panic!("the panic is lost") };
+        assert!(why.starts_with("a thread panicked: index 7 is out of bounds; this is"), "{why}");
+        assert!(guarded(|| Ok(())).is_ok());
     }
 }

@@ -81,6 +81,19 @@ pub(super) fn disturbed(
     wait(child, start)
 }
 
+/// Asks it to end, if it has not.
+#[cfg(unix)]
+pub(super) fn terminate(child: &Child) {
+    if let Ok(pid) = libc::pid_t::try_from(child.id()) {
+        // SAFETY: it is a child that nobody has waited for: the number is its own.
+        unsafe { libc::kill(pid, libc::SIGTERM) };
+    }
+}
+
+/// Elsewhere nothing is asked.
+#[cfg(not(unix))]
+pub(super) fn terminate(_child: &Child) {}
+
 /// Waits for its end with what it used.
 #[cfg(unix)]
 fn wait(mut child: Child, start: Instant) -> io::Result<Ended> {

@@ -12,7 +12,7 @@ use crate::picture::Picture;
 use crate::rop::{PixelIndex, Reference, ReferenceKey, ReplayOptions};
 use crate::study::stress::SIGNIFICANCE;
 use crate::study::stress::case::{Case, Group, layer};
-use crate::trace::Trace;
+use crate::trace::{Fragment, Trace};
 
 /// Distances that are tried: between numbers of surfaces, seeds and pixels.
 const LAGS: [u32; 4] = [1, 2, 3, 8];
@@ -61,8 +61,8 @@ pub struct Correlation {
     pub between: Between,
     /// Over the pixels of an image; else over the surfaces or seeds of single pixels.
     pub over_image: bool,
-    /// Pearson's coefficient, the one that is farthest from 0.
-    pub r: f64,
+    /// Pearson's coefficient, the one that is farthest from 0; none where nothing varies.
+    pub r: Option<f64>,
     /// Its distance from 0 in standard deviations of independent numbers.
     pub deviations: f64,
     /// Whether that is more than chance allows.
@@ -85,7 +85,7 @@ impl CorrelationRow {
     }
 }
 
-/// Pearson's coefficient.
+/// Pearson's coefficient, NaN where one side does not vary, and the number of pairs.
 fn pearson(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> (f64, f64) {
     let mut n = 0.0;
     let (mut a, mut b) = (0.0, 0.0);
@@ -101,8 +101,7 @@ fn pearson(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> (f64, f64) {
         xx += (x - a) * (x - a);
         yy += (y - b) * (y - b);
     }
-    let r = if xx > 0.0 && yy > 0.0 { xy / (xx * yy).sqrt() } else { 0.0 };
-    (r, n)
+    (if xx > 0.0 && yy > 0.0 { xy / (xx * yy).sqrt() } else { f64::NAN }, n)
 }
 
 /// Standard deviations beyond which one of `tests` is correlated.
@@ -119,10 +118,11 @@ fn largest(
     all: impl Iterator<Item = (f64, f64)>,
 ) -> Correlation {
     let score = |(r, n): (f64, f64)| r * n.sqrt();
-    let most = all.max_by(|a, b| score(*a).abs().total_cmp(&score(*b).abs())).unwrap_or((0.0, 1.0));
-    let deviations = score(most).abs();
+    let varies = all.filter(|(r, _)| !r.is_nan());
+    let most = varies.max_by(|a, b| score(*a).abs().total_cmp(&score(*b).abs()));
+    let deviations = most.map_or(0.0, |m| score(m).abs());
     let correlated = deviations > threshold(tests);
-    Correlation { between, over_image, r: most.0, deviations, correlated }
+    Correlation { between, over_image, r: most.map(|m| m.0), deviations, correlated }
 }
 
 /// Every hash of reference values, its surfaces and seeds hashed first or not.
@@ -176,10 +176,10 @@ const SEEDS: u32 = 8;
 /// # Errors
 /// As [`Configured::replay`].
 pub(super) fn pictures(designs: &[Configured]) -> Result<Vec<CorrelationRow>> {
-    // What is drawn is the same; its surface is another.
+    // What is drawn is the same; its surface is another, and so is what it belongs to.
     let surface = |before: u32| -> Result<Trace> {
         let black = (0..before).map(|i| layer(400 - i, [0.0; 3], 1.0));
-        let seen = layer(0, [1.0; 3], 0.3);
+        let seen = Fragment { primitive: before, object: before, ..layer(0, [1.0; 3], 0.3) };
         let case = Case { side: SIDE, ..Case::new(Group::Order, "correlation", "") };
         case.kind(black.chain([seen])).trace()
     };
@@ -242,7 +242,7 @@ mod tests {
         }
         // What does not scramble is one sequence moved along.
         let moved = of("radical-inverse").get(Between::Surfaces, true).unwrap();
-        assert!(moved.correlated && moved.r.abs() > 0.1, "{moved:?}");
+        assert!(moved.correlated && moved.r.unwrap().abs() > 0.1, "{moved:?}");
     }
 
     #[test]

@@ -20,7 +20,7 @@ use crate::error::{Error, Result};
 use crate::gpu::{Gpu, GpuOptions};
 use crate::output::{OutputFile, is_partial};
 use crate::rop::ReplayOptions;
-use crate::study::stress::child::{Ended, command, disturbed, limited, run};
+use crate::study::stress::child::{Ended, command, disturbed, limited, run, terminate};
 use crate::trace::Trace;
 
 /// A fault, how often it was brought about, and how often nothing was lost.
@@ -57,10 +57,20 @@ impl Fault {
             Ok(()) if ended.succeeded() => self.done += 1,
             Ok(()) => {
                 self.survived += 1;
-                self.said = ended.words();
+                self.said = without_folders(&ended.words());
             }
         }
     }
+}
+
+/// What was said, files named without the folders that they happen to lie in.
+fn without_folders(said: &str) -> String {
+    let word = |word: &str| {
+        let name = word.rsplit_once('/').filter(|_| word.starts_with('/')).map(|(_, name)| name);
+        name.unwrap_or(word).to_string()
+    };
+    let said = said.replace("screendoor: error: ", "");
+    said.split(' ').map(word).collect::<Vec<_>>().join(" ")
 }
 
 /// Where the faults happen: the program, a folder, a trace in it.
@@ -235,10 +245,7 @@ impl Place<'_> {
         for moment in 0..24 {
             let (_folder, path) = self.output("a.arrow")?;
             let ended = disturbed(&mut self.writing(&path), whole * moment / 22, |child| {
-                Command::new("kill")
-                    .arg(child.id().to_string())
-                    .stderr(std::process::Stdio::null())
-                    .status()?;
+                terminate(child);
                 Ok(())
             })?;
             fault.add(&ended, Self::kept(&path, &ended, true));
@@ -319,7 +326,7 @@ impl Place<'_> {
     }
 
     fn shrinking(&self) -> io::Result<Fault> {
-        let what = "a trace that another program cuts while it is replayed, at 24 moments";
+        let what = "a trace that another program cuts while it is replayed, at 24 moments of its first half";
         let mut fault = Fault::new("cut while it is read", what);
         let bytes = fs::read(&self.trace)?;
         let path = self.folder.path().join("shrinking.arrow");
@@ -328,7 +335,7 @@ impl Place<'_> {
             fs::write(&path, &bytes)?;
             let (_folder, output) = self.output("a.exr")?;
             let mut command = self.command(&Self::replay_arguments(&path, &output));
-            let ended = disturbed(&mut command, whole * moment / 24, |_| {
+            let ended = disturbed(&mut command, whole * moment / 60, |_| {
                 fs::File::options().write(true).open(&path)?.set_len(bytes.len() as u64 / 3)
             })?;
             let clear = if ended.succeeded() || ended.refused() {

@@ -10,6 +10,7 @@ mod judge;
 mod truth;
 mod unfit;
 
+use std::cell::RefCell;
 use std::path::Path;
 
 use rayon::prelude::*;
@@ -56,7 +57,7 @@ pub struct Plan<'a> {
     /// Seeds of each design that has any; at least 2.
     pub seeds: u32,
     /// Is told what is tried, how many of how many.
-    pub progress: &'a (dyn Fn(&str, u64, u64) + Sync),
+    pub progress: &'a dyn Fn(&str, u64, u64),
 }
 
 /// What was found.
@@ -121,6 +122,16 @@ pub struct Agreement {
     pub difference: Option<f64>,
     /// Why it refuses.
     pub refused: Option<String>,
+}
+
+/// What goes with every study: designs alone, on the processor.
+///
+/// # Errors
+/// As [`stress`].
+pub fn stress_designs(seeds: u32, progress: impl FnMut(&str, u64, u64)) -> Result<Stability> {
+    let progress = RefCell::new(progress);
+    let told = |what: &str, done, total| (progress.borrow_mut())(what, done, total);
+    stress(&Plan { program: None, gpu: &|| Ok(None), seeds, progress: &told })
 }
 
 impl Stability {
