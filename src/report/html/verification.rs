@@ -89,10 +89,33 @@ pub fn sections(markdown: &str, figure: &Figure<'_>) -> Vec<Section> {
         let taken = |name: &String| list.iter().any(|s| s.anchor == *name);
         let mut names = std::iter::once(base.clone()).chain((2..).map(|i| format!("{base}-{i}")));
         let anchor = names.find(|name| !taken(name)).unwrap_or(base);
-        let body = html! { div class="document" { (rendered(content, figure)) } };
+        let body = html! { div class="document" { (folded(content, figure)) } };
         list.push(Section { title, anchor, place: Place::Verification, body });
     }
     list
+}
+
+/// Parts under `###` of which a section may have so many before they are folded.
+const MOST_PARTS: usize = 3;
+
+/// A section's content; where it has many parts, each opens at a click.
+fn folded(content: &[Event<'_>], figure: &Figure<'_>) -> Markup {
+    let third =
+        |e: &Event<'_>| matches!(e, Event::Start(Tag::Heading { level: HeadingLevel::H3, .. }));
+    let starts: Vec<usize> = (0..content.len()).filter(|i| third(&content[*i])).collect();
+    if starts.len() <= MOST_PARTS {
+        return rendered(content, figure);
+    }
+    let ends = starts.iter().skip(1).copied().chain([content.len()]);
+    html! {
+        (rendered(&content[..starts[0]], figure))
+        @for (start, end) in starts.iter().copied().zip(ends) {
+            @let part = &content[start..end];
+            @let after = part.iter().position(|e| matches!(e, Event::End(TagEnd::Heading(_))));
+            @let (heading, rest) = part.split_at(after.map_or(part.len(), |i| i + 1));
+            details { summary { (plain_text(heading)) } (rendered(rest, figure)) }
+        }
+    }
 }
 
 #[cfg(test)]
@@ -162,6 +185,18 @@ mod tests {
         // What is no PNG is none.
         let list = sections("## A\n\n![a](a.png)", &|_| Some(b"GIF89a".to_vec()));
         assert!(list[0].body.0.contains("Missing picture: a.png"));
+    }
+
+    #[test]
+    fn many_parts_are_folded_and_few_are_not() {
+        let parts = |n: usize| {
+            let list: String = (0..n).map(|i| format!("### Part {i}\n\nText {i}.\n\n")).collect();
+            sections(&format!("## A\n\nBefore.\n\n{list}"), &|_| None)[0].body.0.clone()
+        };
+        assert!(!parts(3).contains("<details>"), "{}", parts(3));
+        let folded = "<p>Before.</p><details><summary>Part 0</summary><p>Text 0.</p></details>";
+        let body = parts(4).replace('\n', "");
+        assert!(body.contains(folded) && body.matches("</details>").count() == 4, "{body}");
     }
 
     #[test]

@@ -43,6 +43,7 @@ pub(super) fn text(text: &mut String, found: &Stability) {
         found.seeds, SIGNIFICANCE
     );
     engines(text, found);
+    summary(text, found);
     let mut messages = Vec::new();
     for (group, choice) in Group::ALL.iter().zip(Group::CHOICES) {
         let cases: Vec<&Facts> = found.cases.iter().filter(|c| c.group == *group).collect();
@@ -72,6 +73,34 @@ pub(super) fn text(text: &mut String, found: &Stability) {
     if !messages.is_empty() {
         text.push('\n');
     }
+}
+
+/// How often each design is right.
+fn summary(text: &mut String, found: &Stability) {
+    let groups: Vec<Group> =
+        Group::ALL.iter().copied().filter(|g| found.cases.iter().any(|c| c.group == *g)).collect();
+    let right = |series: &Series, group: Group| {
+        let cases = found.cases.iter().filter(|c| c.group == group);
+        let findings: Vec<&Finding> =
+            cases.filter_map(|c| found.finding(&c.name, &series.name)).collect();
+        let fine = |f: &&&Finding| matches!(f.outcome, Outcome::Exact | Outcome::Within { .. });
+        format!("{} of {}", findings.iter().filter(fine).count(), findings.len())
+    };
+    let rows: Vec<Vec<String>> = found
+        .series
+        .iter()
+        .map(|s| {
+            let cells = groups.iter().map(|g| right(s, *g));
+            std::iter::once(format!("`{}`", s.name)).chain(cells).collect()
+        })
+        .collect();
+    let names = groups.iter().map(|g| Group::CHOICES[*g as usize].name);
+    let head: Vec<&str> = std::iter::once("design").chain(names).collect();
+    text.push_str(
+        "Cases in which a design is exact or within its bound, by what is hard about them:\n\n",
+    );
+    text.push_str(&markdown_table(&head, &rows));
+    text.push('\n');
 }
 
 fn sentence(text: &str) -> String {
