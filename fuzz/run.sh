@@ -26,8 +26,8 @@ for target in "${targets[@]}"; do
     log=$(mktemp)
     start=$SECONDS
     # It stops at the first failure.
-    "$built/$target" -runs="$executions" -max_len=8192 -timeout=5 \
-        -rss_limit_mb=1024 -malloc_limit_mb=256 -print_final_stats=1 \
+    "$built/$target" -runs="$executions" -max_len=16384 -timeout=5 \
+        -rss_limit_mb=1024 -print_final_stats=1 \
         -artifact_prefix="$artifacts/" "$corpus" "fuzz/seeds/$target" >"$log" 2>&1 || true
     last=$(grep -E '^#[0-9]+' "$log" | tail -n 1)
     {

@@ -3,6 +3,7 @@
 //! Every message says what is wrong, where, and what to do about it, in one
 //! line: the command line prints it as it stands.
 
+use std::any::Any;
 use std::fmt::Display;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -117,6 +118,13 @@ pub(crate) fn one_line(text: impl Display) -> String {
     let text = text.to_string();
     let words: Vec<&str> = text.split(char::is_control).filter(|w| !w.is_empty()).collect();
     if words.len() < 2 { words.concat() } else { words.join(" ") }
+}
+
+/// What a panic said, in one line.
+pub(crate) fn panic_text(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().copied();
+    let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+    one_line(text.unwrap_or("no reason is given"))
 }
 
 #[cfg(test)]

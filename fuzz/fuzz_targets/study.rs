@@ -2,6 +2,8 @@
 
 #[path = "../../tests/it/inputs.rs"]
 mod inputs;
+#[path = "../limit.rs"]
+mod limit;
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
     inputs::named("study").take(bytes);

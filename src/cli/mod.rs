@@ -81,10 +81,10 @@ pub fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments, console: &Console) -> Result<()> {
-    if let Some(threads) = arguments.threads {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global();
-        pool.map_err(|e| Error::config(e, "ask for fewer threads"))?;
-    }
+    // Now, since threads that cannot be had are an error here and a panic later.
+    let threads = arguments.threads.map_or(0, usize::from);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+    pool.map_err(|e| Error::config(e, "ask for fewer threads with --threads, or free memory"))?;
     match &arguments.command {
         Command::Report(a) => report::run(a, console),
         Command::Study(a) => study::run(a, console),

@@ -1,5 +1,8 @@
 //! What happens when the user or the system ends the program early.
 
+#[cfg(unix)]
+use std::sync::atomic::{AtomicBool, Ordering};
+
 /// Has Ctrl-C, termination and hang-up remove files under construction before
 /// they end the process, as they would have. So does a mapped file of which a part is gone
 /// (another program cut it, its disk failed): that is told as an error like any other.
@@ -15,7 +18,7 @@ pub(super) fn clean_up() {
     let watch = move || {
         for signal in signals.forever() {
             crate::output::abandon_all();
-            if bus::HAS_FAILED.load(std::sync::atomic::Ordering::SeqCst) {
+            if HAS_FAILED.load(Ordering::SeqCst) {
                 eprintln!(
                     "screendoor: error: a file that is being read was cut or cannot be read any \
                      more; leave it as it is while it is read, or restore a copy"
@@ -26,35 +29,49 @@ pub(super) fn clean_up() {
         }
     };
     if std::thread::Builder::new().name("signals".to_string()).spawn(watch).is_ok() {
+        #[cfg(target_os = "linux")]
         bus::report();
     }
 }
 
-/// What to do where memory that a file is mapped to cannot be read (SIGBUS).
+/// Whether memory that a file is mapped to could not be read.
 #[cfg(unix)]
-mod bus {
-    use std::sync::atomic::{AtomicBool, Ordering};
+static HAS_FAILED: AtomicBool = AtomicBool::new(false);
 
-    pub(super) static HAS_FAILED: AtomicBool = AtomicBool::new(false);
+/// What to do then (SIGBUS). Only on Linux: elsewhere a stack that is too deep is told by
+/// the same signal.
+#[cfg(target_os = "linux")]
+mod bus {
+    use std::sync::atomic::Ordering;
 
     /// Has the thread that watches for signals end the process. Not by `signal_hook`, which
     /// also calls the handler that was there before: the standard library's ends the process
     /// at once.
     pub(super) fn report() {
-        // SAFETY: the handler is one; all that it does is safe in one.
+        let handler: extern "C" fn(_, _, _) = handler;
+        // SAFETY: the handler is one of three arguments; all that it does is safe in one.
         unsafe {
             let mut action: libc::sigaction = std::mem::zeroed();
-            action.sa_sigaction = handler as extern "C" fn(libc::c_int) as libc::sighandler_t;
-            action.sa_flags = libc::SA_ONSTACK;
+            action.sa_sigaction = handler as libc::sighandler_t;
+            action.sa_flags = libc::SA_ONSTACK | libc::SA_SIGINFO;
             libc::sigemptyset(&raw mut action.sa_mask);
             libc::sigaction(libc::SIGBUS, &raw const action, std::ptr::null_mut());
         }
     }
 
-    extern "C" fn handler(_signal: libc::c_int) {
-        HAS_FAILED.store(true, Ordering::SeqCst);
-        // SAFETY: both may be called in a handler.
+    extern "C" fn handler(
+        signal: libc::c_int,
+        info: *mut libc::siginfo_t,
+        _context: *mut libc::c_void,
+    ) {
+        // SAFETY: the system gives the information; the functions may be called in a handler.
         unsafe {
+            if (*info).si_code != libc::BUS_ADRERR {
+                // Something else: back to it, and to what would have become of it.
+                libc::signal(signal, libc::SIG_DFL);
+                return;
+            }
+            super::HAS_FAILED.store(true, Ordering::SeqCst);
             libc::kill(libc::getpid(), libc::SIGUSR2);
             // There is nothing to go back to.
             loop {

@@ -24,7 +24,7 @@ pub(super) struct Arguments {
     #[arg(long)]
     designs_only: bool,
     /// Seeds of each design that has any
-    #[arg(long, default_value_t = 16, value_name = "K", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(2..=1000))]
+    #[arg(long, default_value_t = 32, value_name = "K", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(8..=1000))]
     seeds: u32,
     /// The GPU to use: a part of its name or of its driver's; without it any, if there is one
     #[arg(long, value_name = "NAME")]
@@ -83,12 +83,14 @@ fn print(found: &Stability, arguments: &Arguments, console: &Console) -> Result<
             own.len().to_string(),
             count(|o| matches!(o, Outcome::Exact)),
             count(|o| matches!(o, Outcome::Within { .. })),
+            count(|o| matches!(o, Outcome::Undecided { .. })),
             count(|o| matches!(o, Outcome::Degraded { .. })),
             count(|o| matches!(o, Outcome::NotFinite { .. })),
             count(|o| matches!(o, Outcome::Refused { .. })),
         ]);
     }
-    let head = ["cases", "results", "exact", "within", "degraded", "not finite", "refused"];
+    let head =
+        ["cases", "results", "exact", "within", "undecided", "degraded", "not finite", "refused"];
     console.print(format_args!("{}", table(&head, rows)))?;
     for claim in &found.claims {
         let held = if claim.held { "refused" } else { "NOT HELD" };

@@ -63,12 +63,14 @@ fn trace(bytes: &[u8]) -> Result<()> {
     let trace = Trace::from_bytes(bytes.to_vec(), "fuzz")?;
     trace.verify(|_| ())?;
     let header = trace.header();
-    if trace.rows() > MOST || header.width * header.height > MOST as u32 {
+    let pixels = u64::from(header.width) * u64::from(header.height);
+    if trace.rows() > MOST || pixels > MOST {
         return Ok(());
     }
     for design in ["exact", "lk"] {
         let design = configure(design, &[])?;
-        let replayed = design.replay(&trace, 1, 0, &ReplayOptions::default())?;
+        let replayed =
+            design.replay(&trace, header.pattern.samples(), 0, &ReplayOptions::default())?;
         // What does not fit is announced; a NaN would not be.
         assert_eq!(replayed.picture.not_finite(), 0);
     }

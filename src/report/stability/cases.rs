@@ -1,24 +1,31 @@
 //! What designs and engines make of hard cases.
 
+use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use crate::param::Options;
 use crate::report::markdown_table;
 use crate::report::stability::{in_cell, short};
-use crate::study::stress::{Facts, Finding, Group, Outcome, SIGNIFICANCE, Series, Stability};
+use crate::study::stress::{
+    DECIDED, Facts, Finding, Group, HEAVY_SEEDS, Outcome, SIGNIFICANCE, Series, Stability,
+};
 
 pub(super) fn text(text: &mut String, found: &Stability) {
     let count = |of: fn(&Outcome) -> bool| found.findings.iter().filter(|f| of(&f.outcome)).count();
+    let names = found.series.iter().map(|s| s.name.split(':').next().unwrap_or(&s.name));
+    let names: BTreeSet<&str> = names.collect();
     let _ = writeln!(
         text,
         "## Hard cases\n\n\
-         {} designs on {} cases, {} results: {} exact, {} within the stated bound, {} degraded, {} \
-         refused, {} with pixels that are not finite.\n",
+         {} designs with {} sets of parameters on {} cases, {} results: {} exact, {} within the \
+         stated bound, {} undecided, {} degraded, {} refused, {} with pixels that are not finite.\n",
+        names.len(),
         found.series.len(),
         found.cases.len(),
         found.findings.len(),
         count(|o| matches!(o, Outcome::Exact)),
         count(|o| matches!(o, Outcome::Within { .. })),
+        count(|o| matches!(o, Outcome::Undecided { .. })),
         count(|o| matches!(o, Outcome::Degraded { .. })),
         count(|o| matches!(o, Outcome::Refused { .. })),
         count(|o| matches!(o, Outcome::NotFinite { .. })),
@@ -29,18 +36,19 @@ pub(super) fn text(text: &mut String, found: &Stability) {
          error is a share of what the pixel's contributions come to without their signs, the worst \
          channel of the worst kind of pixel.\n\n\
          | cell | meaning |\n|---|---|\n\
-         | = | every pixel of every seed is the truth to the last bit of single precision |\n\
+         | = | every pixel of every seed is off by 2^-23 of that at most |\n\
          | ≤ e | off by e, within what rounding to single precision may come to there |\n\
-         | ± n | the mean over pixels and seeds is within what chance and rounding allow; n is the \
-         noise, the root mean square of single pixels' errors |\n\
+         | ± n | the mean over pixels and seeds is within what chance and rounding allow, at most {}; \
+         n is the noise, the root mean square of single pixels' deviations from that mean |\n\
+         | ± n ? | the same with a wider bound, which decides little |\n\
          | off e, off e ± n | degraded: the mean is off by e, beyond that bound |\n\
          | **not finite** | sums overflow; the replay warns, a study puts the run down as missing |\n\
          | refused (i) | the design says why it cannot: message i |\n\n\
-         Designs that are random are measured over {} seeds (8 where a case has more than 2^17 \
-         fragments); their bounds are crossed by chance alone anywhere in the table with a \
+         Designs that are random are measured over {} seeds ({} at most where a case has more than \
+         2^17 fragments); their bounds are crossed by chance alone anywhere in the table with a \
          probability of {} (Student's t, Bonferroni). What is promised to be unbiased and is off is \
          a broken promise, and so is an engine that differs.\n",
-        found.seeds, SIGNIFICANCE
+        DECIDED, found.seeds, HEAVY_SEEDS, SIGNIFICANCE
     );
     engines(text, found);
     summary(text, found);
@@ -156,7 +164,9 @@ fn cell(finding: &Finding, seeded: bool, messages: &mut Vec<String>) -> String {
         Outcome::Exact => "=".to_string(),
         Outcome::Within { noise, .. } if seeded => format!("± {}", short(*noise)),
         Outcome::Within { error, .. } => format!("≤ {}", short(*error)),
-        Outcome::Degraded { error, noise, .. } if seeded => {
+        Outcome::Undecided { noise, .. } => format!("± {} ?", short(*noise)),
+        // Noise next to nothing says nothing.
+        Outcome::Degraded { error, noise, .. } if seeded && noise > &(1e-3 * error) => {
             format!("off {} ± {}", short(*error), short(*noise))
         }
         Outcome::Degraded { error, .. } => format!("off {}", short(*error)),
@@ -189,7 +199,11 @@ fn fixed_point(text: &mut String, found: &Stability) {
 fn cost(text: &mut String, found: &Stability, cases: &[&Facts]) {
     let misled: Vec<(&&Facts, &str)> = cases.iter().filter_map(|c| Some((c, c.against?))).collect();
     let noise = |case: &str, design: &str| match found.finding(case, design)?.outcome {
-        Outcome::Within { noise, .. } | Outcome::Degraded { noise, .. } if noise > 0.0 => {
+        Outcome::Within { noise, .. }
+        | Outcome::Undecided { noise, .. }
+        | Outcome::Degraded { noise, .. }
+            if noise > 1e-9 =>
+        {
             Some(noise)
         }
         _ => None,
@@ -224,8 +238,9 @@ pub(super) fn unfit(text: &mut String, found: &Stability) {
     text.push_str(
         "## What no trace may hold\n\n\
          One rule: alpha is in [0, 1], colours are finite, a fragment covers at least one sample and \
-         none that does not exist. Nothing is clamped in silence: a value outside is refused when it \
-         is written and, since other programs write traces too, when it is read, with its row.\n\n",
+         none that does not exist. Nothing is clamped in silence: a value outside is refused with \
+         its row when it is written, and by the same check when another program's trace is read \
+         (`nan-alpha.arrow`, `coverage.arrow` of `traces/hostile`).\n\n",
     );
     let rows: Vec<Vec<String>> = found
         .unfit

@@ -65,7 +65,7 @@ pub(super) fn text(text: &mut String) -> Result<()> {
          runs them and writes the figures. {:.1} million executions in all, {failures} failures left. \
          A failure is a panic, an arithmetic overflow, an error of more than one line, a picture that \
          is not finite, an allocation of more than 256 MiB, 5 s without an answer. What is kept of \
-         the corpus (`fuzz/seeds`) goes through the same in every `cargo test`.\n",
+         the corpus (`fuzz/seeds`) is taken by the same functions in every `cargo test`.\n",
         executions as f64 / 1e6
     );
     let rows: Vec<Vec<String>> = figures

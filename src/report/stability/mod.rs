@@ -123,6 +123,7 @@ mod tests {
             (Outcome::Within { error: 0.1, bound: 0.2, noise }, "| `lk` | ± 0.25 |"),
             (Outcome::Degraded { error: 0.5, bound: 0.2, noise }, "| `lk` | off 0.5 ± 0.25 |"),
             (Outcome::NotFinite { pixels: 7 }, "| `lk` | **not finite** |"),
+            (Outcome::Undecided { error: 0.1, bound: 0.2, noise }, "| `lk` | ± 0.25 ? |"),
             (Outcome::Refused { message: "too much".into() }, "| `lk` | refused (1) |"),
         ] {
             let text = stability(&made_up(outcome, None), "c").unwrap();

@@ -38,7 +38,8 @@ pub(super) fn claims(text: &mut String, found: &Stability) {
 pub(super) fn faults(text: &mut String, found: &Stability) {
     text.push_str(
         "## Faults\n\n\
-         The program is run again and again, and each time something fails. It held if no file \
+         The program is run again and again (a panic and a lost GPU are brought about within one \
+         process), and each time something fails. It held if no file \
          stands half written under its name, what stood there before is there still or a whole new \
          file, nothing hangs, and the program says what happened where it is left to.\n\n",
     );

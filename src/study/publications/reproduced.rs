@@ -69,6 +69,6 @@ pub fn measure_publication(
         Publication::Comparison => {
             Reproduced::Comparison(Box::new(compare(models, side, seeds, progress)?))
         }
-        Publication::Stability => Reproduced::Stability(Box::new(stress_designs(8, progress)?)),
+        Publication::Stability => Reproduced::Stability(Box::new(stress_designs(16, progress)?)),
     })
 }

@@ -16,7 +16,7 @@ pub use merge::merge;
 pub use store::{Store, read_json};
 pub use tasks::{Job, Shard, Task, jobs, tasks};
 
-use crate::error::{Error, Result, one_line};
+use crate::error::{Error, Result, panic_text};
 use crate::picture::{Layer, Picture, write_exr};
 use crate::rop::Site;
 use crate::study::engine::EngineName;
@@ -171,11 +171,9 @@ fn guarded(
     // What a run changes outside of itself are files, which appear whole or not at all, and
     // the open scene, which is replaced as a whole.
     catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|panic| {
-        let text = panic.downcast_ref::<&str>().copied();
-        let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
         Err(Failure::Run(format!(
             "a thread panicked: {}; this is a fault of screendoor: report it",
-            one_line(text.unwrap_or("no reason is given"))
+            panic_text(&*panic)
         )))
     })
 }

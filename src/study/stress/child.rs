@@ -48,6 +48,8 @@ impl Ended {
 pub(super) fn command(program: &Path, arguments: &[&OsStr]) -> Command {
     let mut command = Command::new(program);
     command.args(arguments).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
+    // Its last words are to be its own.
+    command.env("RUST_BACKTRACE", "0");
     command
 }
 

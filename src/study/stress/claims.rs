@@ -56,12 +56,12 @@ pub(super) fn claims(program: &Path) -> Result<Vec<Claim>> {
         "doubling.gltf": "2^40 ways to one node",
         "sparse.gltf": "a sparse accessor of 10^12 zeros",
         "outside.gltf": "a buffer outside the scene's folder",
-        "many.ply": "10^12 splats",
+        "many.ply": "10^12 - 1 splats",
         "many.tfx": "65025 points of hair",
         "metadata.vdb": "a name of 4 GiB",
     ]
     .to_vec();
-    files.push(("bomb.png", "a picture of 16384 x 16384 pixels in 100 bytes", &made));
+    files.push(("bomb.png", "a picture of 16384 x 16384 pixels in 65 bytes", &made));
     let folder = tempfile::tempdir().map_err(|e| Error::io("create", std::env::temp_dir(), e))?;
     files
         .into_iter()

@@ -74,6 +74,8 @@ pub struct Correlation {
 pub struct CorrelationRow {
     /// Its name.
     pub name: String,
+    /// Whether two surfaces and two seeds are meant to be unrelated.
+    pub promised: bool,
     /// Over images and in pixels, between surfaces, seeds and pixels.
     pub correlations: Vec<Correlation>,
 }
@@ -161,7 +163,10 @@ pub(super) fn hashes() -> Vec<CorrelationRow> {
             [largest(between, true, tests, image), largest(between, false, tests, single)]
         });
         let prehashed = if *prehash { ", prehashed" } else { "" };
-        CorrelationRow { name: format!("{name}{prehashed}"), correlations: correlations.collect() }
+        // Neighbouring seeds of the second version stay related unless they are hashed first.
+        let promised = reference.scrambles() && (*prehash || *reference != Reference::VegdahlV2);
+        let name = format!("{name}{prehashed}");
+        CorrelationRow { name, promised, correlations: correlations.collect() }
     };
     all.par_iter().map(row).collect()
 }
@@ -219,7 +224,7 @@ pub(super) fn pictures(designs: &[Configured]) -> Result<Vec<CorrelationRow>> {
                 seeds().flat_map(|s| [(1, 0), (0, 1)].map(|step| over(&first[s], &first[s], step))),
             ),
         ];
-        Ok(CorrelationRow { name: design.label(), correlations })
+        Ok(CorrelationRow { name: design.label(), promised: false, correlations })
     };
     designs.par_iter().map(row).collect()
 }

@@ -21,7 +21,7 @@ pub use cases::cases;
 pub use claims::{Claim, MOST_BYTES, MOST_SECONDS};
 pub use correlation::{Between, Correlation, CorrelationRow};
 pub use faults::Fault;
-pub use judge::{Outcome, SIGNIFICANCE};
+pub use judge::{DECIDED, Outcome, SIGNIFICANCE};
 pub use unfit::Unfit;
 
 use crate::design::{Configured, DESIGNS, configure};
@@ -32,6 +32,9 @@ use crate::picture::Picture;
 use crate::rop::{ReplayOptions, Which};
 use crate::study::stress::judge::Judge;
 use crate::trace::Trace;
+
+/// Seeds of cases with many fragments, at most.
+pub const HEAVY_SEEDS: u32 = 16;
 
 /// Designs beside the defaults: those that hard cases are hard for.
 const EXTREMES: [&str; 10] = [
@@ -54,7 +57,7 @@ pub struct Plan<'a> {
     pub program: Option<&'a Path>,
     /// Opens a GPU, for the designs that have a port to it, if there is one.
     pub gpu: &'a dyn Fn() -> Result<Option<Gpu>>,
-    /// Seeds of each design that has any; at least 2.
+    /// Seeds of each design that has any; at least 8, since fewer tell little.
     pub seeds: u32,
     /// Is told what is tried, how many of how many.
     pub progress: &'a dyn Fn(&str, u64, u64),
@@ -152,7 +155,14 @@ impl Stability {
             .faults
             .iter()
             .flat_map(|f| f.failures.iter().map(|failure| format!("{}: {failure}", f.name)));
-        designs.chain(unfit).chain(claims).chain(faults).collect()
+        let hashes = self.hashes.iter().filter(|r| r.promised).flat_map(|row| {
+            let related = |c: &&Correlation| c.correlated && c.between != Between::Pixels;
+            row.correlations.iter().filter(related).map(|c| {
+                let (r, between) = (c.r.unwrap_or(0.0), c.between.words());
+                format!("reference={}: {between} are correlated, {r:.3}", row.name)
+            })
+        });
+        designs.chain(unfit).chain(hashes).chain(claims).chain(faults).collect()
     }
 
     /// What a design makes of a case.
@@ -173,7 +183,7 @@ pub fn stress(plan: &Plan<'_>) -> Result<Stability> {
     let claims = plan.program.map_or(Ok(Vec::new()), claims::claims)?;
     told("faults");
     let gpu = (plan.gpu)()?;
-    let faults = plan.program.map_or(Ok(Vec::new()), |p| faults::faults(p, gpu.is_some()))?;
+    let faults = plan.program.map_or(Ok(Vec::new()), |p| faults::faults(p, plan.gpu))?;
     let designs = designs()?;
     let cases = cases();
     let findings = findings(plan, gpu.as_ref(), &designs, &cases)?;
@@ -287,7 +297,7 @@ impl Trial<'_> {
         };
         let seeds = match design.promises().seeded {
             true if self.case.is_light() => self.seeds,
-            true => self.seeds.min(8),
+            true => self.seeds.min(HEAVY_SEEDS),
             false => 1,
         };
         let rest = (1..seeds).map(|seed| self.picture(design, Which::Fast, seed));
@@ -341,9 +351,14 @@ fn difference(a: &Picture, b: &Picture) -> f64 {
 
 /// What was promised and not kept.
 fn broken(design: &Configured, finding: &Finding) -> Option<String> {
-    if design.promises().unbiased
-        && let Outcome::Degraded { error, bound, .. } = finding.outcome
-    {
+    let unbiased = design.promises().unbiased;
+    if unbiased && let Outcome::NotFinite { pixels } = finding.outcome {
+        return Some(format!("it is unbiased, and {pixels} pixels are not finite"));
+    }
+    if unbiased && let Outcome::Refused { message } = &finding.outcome {
+        return Some(format!("it is unbiased, and refuses: {message}"));
+    }
+    if unbiased && let Outcome::Degraded { error, bound, .. } = finding.outcome {
         return Some(format!(
             "it is unbiased, and its mean is off by {error:.2e} ({bound:.2e} at most)"
         ));

@@ -26,7 +26,7 @@ pub(super) fn cases() -> Vec<Case> {
             &[1e10, 1e30, f32::MAX],
         ),
         beside(
-            new("denormal", "pixels of 1e-40 and of the smallest number"),
+            new("denormal", "pixels of 1e-40 and of the smallest number; off in units of 2^-126"),
             &[1e-40, f32::from_bits(1)],
         ),
         new("in one pixel", "1e-8, 1 and 65504 over each other").kind([

@@ -34,7 +34,7 @@ pub(super) fn cases() -> Vec<Case> {
         Case {
             samples: 64,
             frame: Some(16384),
-            ..new("16384 x 16384 at 64", "the last pixels, whose samples are numbered past 2^34")
+            ..new("16384 x 16384 at 64", "the last pixels, whose samples are numbered up to 2^34")
                 .kind((0..3).map(|i| full(layer(i, hue(i), 0.4))))
         },
         new("one sample", "each layer covers one sample of its own, or all cover the last")
