@@ -166,7 +166,7 @@ const DEFECTS: &[(&str, Threads, Defect)] = &[
     (
         "lk",
         Threads::Pixel,
-        ("return sum * (1.0 / f32(SAMPLES))", "return sum * (1.0000001 / f32(SAMPLES))"),
+        ("let share = 1.0 / f32(SAMPLES);", "let share = 1.0000001 / f32(SAMPLES);"),
     ),
     ("lk", Threads::Pixel, ("rows_to[place] = row;", "rows_to[place] = row - (row & 1u);")),
     ("lk", Threads::Pixel, ("((y & 15u) << 4u) | (x & 15u)", "((y & 15u) << 4u) | (x & 7u)")),

@@ -4,6 +4,7 @@ mod read;
 pub mod srgb;
 mod write;
 
+pub(crate) use read::can_hold;
 pub use read::read;
 pub use write::{Layer, PictureFile, write_exr, write_png};
 

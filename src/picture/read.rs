@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use exr::prelude::{AnyChannels, FlatSamples, ReadChannels, ReadLayers, Text};
+use image::ImageDecoder;
 
 use crate::error::{Error, Result};
 use crate::picture::write::{check_size, exr_error};
@@ -41,12 +42,35 @@ fn read_png(path: &Path, bytes: &[u8]) -> Result<Picture> {
     let mut limits = image::Limits::no_limits();
     limits.max_alloc = Some(crate::picture::write::MAX_PIXELS * 8);
     reader.limits(limits);
-    let image = reader.decode().map_err(|e| bad(&e))?.into_rgb8();
-    let (width, height) = image.dimensions();
+    let decoder = reader.into_decoder().map_err(|e| bad(&e))?;
+    let (width, height) = decoder.dimensions();
     check_frame(path, width as usize, height as usize)?;
+    if !can_hold(bytes, width, height) {
+        return Err(overclaimed(path, format_args!("{width}x{height} pixels"), bytes));
+    }
+    let image = image::DynamicImage::from_decoder(decoder).map_err(|e| bad(&e))?.into_rgb8();
     Ok(Picture::from_fn(TileGrid::new(width, height), |x, y| {
         image.get_pixel(x, y).0.map(|v| srgb::decode(f64::from(v) / 255.0))
     }))
+}
+
+/// How many bytes one byte of a DEFLATE stream can stand for.
+const DEFLATE: u64 = 1032;
+
+/// Whether a PNG (or JPEG, which packs less) of so many bytes can hold so many pixels, each
+/// of which takes a bit at least.
+pub(crate) fn can_hold(bytes: &[u8], width: u32, height: u32) -> bool {
+    u64::from(width) * u64::from(height) / 8 / DEFLATE <= bytes.len() as u64
+}
+
+/// The same of what EXR files are packed with, more than any of it does.
+const EXR: u64 = 1 << 14;
+
+/// A picture that so short a file cannot hold: it would be allocated before that is found
+/// out.
+fn overclaimed(path: &Path, claimed: std::fmt::Arguments<'_>, bytes: &[u8]) -> Error {
+    let what = format!("it claims {claimed} and is {} bytes long", bytes.len());
+    Error::invalid(path.display(), what, "it is damaged: replace it")
 }
 
 fn check_frame(path: &Path, width: usize, height: usize) -> Result<()> {
@@ -67,6 +91,11 @@ fn read_exr(path: &Path, bytes: &[u8], layer: Option<&str>) -> Result<Picture> {
         .map_err(|e| exr_error(path, "read", e))?;
     for header in &meta.headers {
         check_frame(path, header.layer_size.0, header.layer_size.1)?;
+        let pixels = (header.layer_size.0 * header.layer_size.1) as u64;
+        let claimed = pixels * header.channels.bytes_per_pixel as u64;
+        if claimed / EXR > bytes.len() as u64 {
+            return Err(overclaimed(path, format_args!("{claimed} bytes of pixels"), bytes));
+        }
     }
     let image = exr::prelude::read()
         .no_deep_data()

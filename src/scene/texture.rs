@@ -6,7 +6,7 @@ use glam::{Vec2, Vec4};
 use image::{DynamicImage, ImageDecoder, ImageReader, Limits};
 
 use crate::error::{Error, Result};
-use crate::picture::srgb;
+use crate::picture::{can_hold, srgb};
 use crate::scene::file;
 
 /// The largest side of a texture.
@@ -141,6 +141,12 @@ impl Texture {
             )
             .to_string();
             return Err(Error::unsupported(place, what, "scale it down"));
+        }
+        if !can_hold(bytes, width, height) {
+            return Err(bad(&format_args!(
+                "{} bytes hold no {width} x {height} texels",
+                bytes.len()
+            )));
         }
         let image = DynamicImage::from_decoder(decoder).map_err(|e| bad(&e))?;
         Ok(Self::from_image(image, encoding))
