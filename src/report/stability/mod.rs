@@ -13,7 +13,7 @@ use crate::study::stress::Stability;
 /// The document; of what was not tried it says nothing.
 ///
 /// # Errors
-/// As [`fuzzing::text`].
+/// [`Error::Invalid`](crate::error::Error::Invalid) where the figures of fuzzing are damaged.
 pub fn stability(found: &Stability, command: &str) -> Result<String> {
     let mut text = "# Stability\n\n".to_string();
     let broken = found.broken();

@@ -16,7 +16,7 @@ pub const SIGNIFICANCE: f64 = 1e-3;
 pub const DECIDED: f64 = 0.05;
 
 /// How close a design's pictures come to the truth. Errors are shares of the scale of a
-/// pixel's contributions ([`Truth::scale`]), the worst channel of the worst kind of pixel.
+/// pixel's contributions, the worst channel of the worst kind of pixel.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 #[serde(tag = "outcome", rename_all = "kebab-case")]
 pub enum Outcome {
