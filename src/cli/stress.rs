@@ -75,22 +75,13 @@ fn print(found: &Stability, arguments: &Arguments, console: &Console) -> Result<
     let mut rows = Vec::new();
     for (group, choice) in Group::ALL.iter().zip(Group::CHOICES) {
         let of_group = |case: &str| found.cases.iter().any(|c| c.name == case && c.group == *group);
-        let own: Vec<&Outcome> =
-            found.findings.iter().filter(|f| of_group(&f.case)).map(|f| &f.outcome).collect();
-        let count = |of: fn(&Outcome) -> bool| own.iter().filter(|o| of(o)).count().to_string();
-        rows.push(vec![
-            choice.name.to_string(),
-            own.len().to_string(),
-            count(|o| matches!(o, Outcome::Exact)),
-            count(|o| matches!(o, Outcome::Within { .. })),
-            count(|o| matches!(o, Outcome::Undecided { .. })),
-            count(|o| matches!(o, Outcome::Degraded { .. })),
-            count(|o| matches!(o, Outcome::NotFinite { .. })),
-            count(|o| matches!(o, Outcome::Refused { .. })),
-        ]);
+        let own = found.findings.iter().filter(|f| of_group(&f.case)).map(|f| &f.outcome);
+        let counts = Outcome::count(own);
+        let numbers = std::iter::once(counts.iter().sum()).chain(counts);
+        let numbers = numbers.map(|n: usize| n.to_string());
+        rows.push(std::iter::once(choice.name.to_string()).chain(numbers).collect());
     }
-    let head =
-        ["cases", "results", "exact", "within", "undecided", "degraded", "not finite", "refused"];
+    let head: Vec<&str> = ["cases", "results"].into_iter().chain(Outcome::KINDS).collect();
     console.print(format_args!("{}", table(&head, rows)))?;
     for claim in &found.claims {
         let held = if claim.held { "refused" } else { "NOT HELD" };

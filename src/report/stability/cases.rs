@@ -11,24 +11,20 @@ use crate::study::stress::{
 };
 
 pub(super) fn text(text: &mut String, found: &Stability) {
-    let count = |of: fn(&Outcome) -> bool| found.findings.iter().filter(|f| of(&f.outcome)).count();
+    let [exact, within, undecided, degraded, not_finite, refused] =
+        Outcome::count(found.findings.iter().map(|f| &f.outcome));
     let names = found.series.iter().map(|s| s.name.split(':').next().unwrap_or(&s.name));
     let names: BTreeSet<&str> = names.collect();
     let _ = writeln!(
         text,
         "## Hard cases\n\n\
-         {} designs with {} sets of parameters on {} cases, {} results: {} exact, {} within the \
-         stated bound, {} undecided, {} degraded, {} refused, {} with pixels that are not finite.\n",
+         {} designs with {} sets of parameters on {} cases, {} results: {exact} exact, {within} within the \
+         stated bound, {undecided} undecided, {degraded} degraded, {refused} refused, {not_finite} with \
+         pixels that are not finite.\n",
         names.len(),
         found.series.len(),
         found.cases.len(),
         found.findings.len(),
-        count(|o| matches!(o, Outcome::Exact)),
-        count(|o| matches!(o, Outcome::Within { .. })),
-        count(|o| matches!(o, Outcome::Undecided { .. })),
-        count(|o| matches!(o, Outcome::Degraded { .. })),
-        count(|o| matches!(o, Outcome::Refused { .. })),
-        count(|o| matches!(o, Outcome::NotFinite { .. })),
     );
     let _ = writeln!(
         text,
@@ -119,7 +115,7 @@ fn sentence(text: &str) -> String {
 /// How the engines agree.
 fn engines(text: &mut String, found: &Stability) {
     let all = found.findings.iter().flat_map(|f| &f.engines);
-    let on = |gpu: bool| all.clone().filter(move |a| (a.engine == "gpu") == gpu);
+    let on = |gpu: bool| all.clone().filter(move |a| a.is_gpu() == gpu);
     let same = |gpu: bool| on(gpu).filter(|a| a.difference == Some(0.0)).count();
     let _ = write!(
         text,

@@ -35,7 +35,7 @@ struct Asset {
 pub(super) fn read<'a>(path: &Path, bytes: &'a [u8]) -> Result<(Document, Option<Cow<'a, [u8]>>)> {
     let place = path.display();
     let bad = |what: &dyn std::fmt::Display| {
-        let what = one_line(format!("it cannot be read as glTF: {what}"));
+        let what = format_args!("it cannot be read as glTF: {what}");
         Error::invalid(&place, what, "export the file again")
     };
     let (text, blob) = if bytes.starts_with(b"glTF") {

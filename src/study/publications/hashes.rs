@@ -45,28 +45,30 @@ pub const TRIES: u32 = 1 << 17;
 
 /// The table, over `seeds` seeds.
 pub(super) fn hashes(seeds: u32) -> Result<Vec<HashRow>> {
-    let mut rows = Vec::new();
-    for (reference, choice) in Reference::ALL.iter().zip(Reference::CHOICES) {
-        for prehash in [false, true] {
-            // Independent numbers have no seed to correlate by.
-            if prehash && *reference == Reference::White {
-                continue;
-            }
-            rows.push(row(*reference, choice.name, prehash, seeds)?);
-        }
-    }
-    Ok(rows)
+    Values::all().map(|(values, name)| row(values, name, seeds)).collect()
 }
 
 /// Reference values of one hash.
 #[derive(Clone, Copy)]
-struct Values {
-    reference: Reference,
-    prehash: bool,
+pub(in crate::study) struct Values {
+    pub reference: Reference,
+    pub prehash: bool,
 }
 
 impl Values {
-    fn at(self, n: u32, samples: u32, pixel: u32, surface: u32, seed: u32) -> u32 {
+    /// Those of every hash, with or without the seeds hashed first, and the hash's name.
+    pub fn all() -> impl Iterator<Item = (Self, &'static str)> {
+        let named = Reference::ALL.iter().zip(Reference::CHOICES);
+        let each = named.flat_map(|(reference, choice)| {
+            let reference = *reference;
+            [false, true].map(|prehash| (Values { reference, prehash }, choice.name))
+        });
+        // Independent numbers have no seed to correlate by.
+        each.filter(|(v, _)| !(v.prehash && v.reference == Reference::White))
+    }
+
+    /// The reference value of sample number `n` of a pixel with so many samples.
+    pub fn at(self, n: u32, samples: u32, pixel: u32, surface: u32, seed: u32) -> u32 {
         let key = ReferenceKey { pixel: PixelIndex(pixel), surface, seed };
         let key = if self.prehash { key.prehashed() } else { key };
         self.reference.value(n, samples, &key)
@@ -123,8 +125,8 @@ impl Values {
     }
 }
 
-fn row(reference: Reference, name: &'static str, prehash: bool, seeds: u32) -> Result<HashRow> {
-    let values = Values { reference, prehash };
+fn row(values: Values, name: &'static str, seeds: u32) -> Result<HashRow> {
+    let prehash = values.prehash;
     const SIDE: u32 = 128;
     let gray = |i: u32| [(i * 5 % 8) as f32 / 7.0; 3];
     let layers: Vec<_> = (0..8).map(|i| (gray(i), 0.3)).collect();

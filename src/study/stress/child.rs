@@ -53,11 +53,11 @@ pub(super) fn command(program: &Path, arguments: &[&OsStr]) -> Command {
     command
 }
 
-/// The same within a limit of the shell's `ulimit`, a full disk being an error and no signal.
-pub(super) fn limited(program: &Path, limit: &str, arguments: &[&OsStr]) -> Command {
+/// A command within a limit of the shell's `ulimit`, a full disk being an error and no signal.
+pub(super) fn limited(limit: &str, inner: &Command) -> Command {
     let script = format!("trap '' XFSZ; ulimit {limit} || exit 99; exec \"$0\" \"$@\"");
     let mut command = command(Path::new("sh"), &["-c".as_ref(), script.as_ref()]);
-    command.arg(program).args(arguments);
+    command.arg(inner.get_program()).args(inner.get_args());
     command
 }
 

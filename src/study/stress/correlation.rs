@@ -7,9 +7,9 @@ use statrs::distribution::{ContinuousCDF, Normal};
 
 use crate::design::Configured;
 use crate::error::Result;
-use crate::param::Options;
 use crate::picture::Picture;
-use crate::rop::{PixelIndex, Reference, ReferenceKey, ReplayOptions};
+use crate::rop::{Reference, ReplayOptions};
+use crate::study::publications::hashes::Values;
 use crate::study::stress::SIGNIFICANCE;
 use crate::study::stress::case::{Case, Group, layer};
 use crate::trace::{Fragment, Trace};
@@ -129,28 +129,15 @@ fn largest(
 
 /// Every hash of reference values, its surfaces and seeds hashed first or not.
 pub(super) fn hashes() -> Vec<CorrelationRow> {
-    let all: Vec<(Reference, &str, bool)> = Reference::ALL
-        .iter()
-        .zip(Reference::CHOICES)
-        .flat_map(|(r, c)| [false, true].map(|prehash| (*r, c.name, prehash)))
-        // Independent numbers have no seed to correlate by.
-        .filter(|(r, _, prehash)| !(*prehash && *r == Reference::White))
-        .collect();
+    let all: Vec<(Values, &str)> = Values::all().collect();
     let tests = all.len() * 3 * LAGS.len() * (1 + PIXELS.len());
-    let row = |(reference, name, prehash): &(Reference, &str, bool)| {
+    let row = |(values, name): &(Values, &str)| {
+        let of = |pixel, surface, seed| f64::from(values.at(SAMPLE, SAMPLES, pixel, surface, seed));
         // The same sample on both sides.
-        let pair = |between, pixel: u32, i: u32, lag: u32| {
-            let key =
-                |pixel, surface, seed| ReferenceKey { pixel: PixelIndex(pixel), surface, seed };
-            let of = |key: ReferenceKey| {
-                let key = if *prehash { key.prehashed() } else { key };
-                f64::from(reference.value(SAMPLE, SAMPLES, &key))
-            };
-            match between {
-                Between::Surfaces => (of(key(pixel, i, 0)), of(key(pixel, i.wrapping_add(lag), 0))),
-                Between::Seeds => (of(key(pixel, 5, i)), of(key(pixel, 5, i.wrapping_add(lag)))),
-                Between::Pixels => (of(key(pixel, i, 0)), of(key(pixel.wrapping_add(lag), i, 0))),
-            }
+        let pair = |between, pixel: u32, i: u32, lag: u32| match between {
+            Between::Surfaces => (of(pixel, i, 0), of(pixel, i.wrapping_add(lag), 0)),
+            Between::Seeds => (of(pixel, 5, i), of(pixel, 5, i.wrapping_add(lag))),
+            Between::Pixels => (of(pixel, i, 0), of(pixel.wrapping_add(lag), i, 0)),
         };
         let correlations = Between::ALL.into_iter().flat_map(|between| {
             let image = LAGS
@@ -162,9 +149,10 @@ pub(super) fn hashes() -> Vec<CorrelationRow> {
             });
             [largest(between, true, tests, image), largest(between, false, tests, single)]
         });
-        let prehashed = if *prehash { ", prehashed" } else { "" };
+        let Values { reference, prehash } = *values;
+        let prehashed = if prehash { ", prehashed" } else { "" };
         // Neighbouring seeds of the second version stay related unless they are hashed first.
-        let promised = reference.scrambles() && (*prehash || *reference != Reference::VegdahlV2);
+        let promised = reference.scrambles() && (prehash || reference != Reference::VegdahlV2);
         let name = format!("{name}{prehashed}");
         CorrelationRow { name, promised, correlations: correlations.collect() }
     };

@@ -167,9 +167,7 @@ impl Place<'_> {
         for blocks in [0, 1, 8, 64, 512, 1024, 2048, 4096] {
             for name in ["a.arrow", "a.exr", "a.png"] {
                 let (_folder, path) = self.output(name)?;
-                let writing = self.writing(&path);
-                let arguments: Vec<&OsStr> = writing.get_args().collect();
-                let ended = run(&mut limited(self.program, &format!("-f {blocks}"), &arguments))?;
+                let ended = run(&mut limited(&format!("-f {blocks}"), &self.writing(&path)))?;
                 let clear = said_clearly(ended.succeeded() || ended.refused());
                 fault.add(&ended, clear.and(Self::kept(&path, &ended, true)));
             }
@@ -249,14 +247,12 @@ impl Place<'_> {
         for mebibytes in (16..=64).step_by(2).chain([96, 128]) {
             // Where the system cannot even load it there is nothing to see.
             let limit = format!("-v {}", mebibytes * 1024);
-            if !run(&mut limited(self.program, &limit, &["--version".as_ref()]))?.succeeded() {
+            if !run(&mut limited(&limit, &self.command(&["--version".as_ref()])))?.succeeded() {
                 continue;
             }
             for name in ["a.arrow", "a.exr"] {
                 let (_folder, path) = self.output(name)?;
-                let writing = self.writing(&path);
-                let arguments: Vec<&OsStr> = writing.get_args().collect();
-                let ended = run(&mut limited(self.program, &limit, &arguments))?;
+                let ended = run(&mut limited(&limit, &self.writing(&path)))?;
                 let says = ["memory", "thread"].iter().any(|word| ended.said.contains(word));
                 let clear = ended.succeeded() || says;
                 // The system may end it; a file under construction then stays.

@@ -1,9 +1,9 @@
 //! Holding a design's pictures of a case against the truth.
 
 use serde::Serialize;
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::error::Result;
+use crate::metrics::student_t;
 use crate::picture::Picture;
 use crate::study::stress::case::Case;
 use crate::study::stress::truth::{Truth, truth};
@@ -60,6 +60,31 @@ pub enum Outcome {
         /// What it says.
         message: String,
     },
+}
+
+impl Outcome {
+    /// What outcomes there are, in a word each.
+    pub const KINDS: [&str; 6] =
+        ["exact", "within", "undecided", "degraded", "not finite", "refused"];
+
+    fn kind(&self) -> usize {
+        match self {
+            Outcome::Exact => 0,
+            Outcome::Within { .. } => 1,
+            Outcome::Undecided { .. } => 2,
+            Outcome::Degraded { .. } => 3,
+            Outcome::NotFinite { .. } => 4,
+            Outcome::Refused { .. } => 5,
+        }
+    }
+
+    /// How many there are of each kind.
+    pub fn count<'a>(all: impl IntoIterator<Item = &'a Outcome>) -> [usize; Self::KINDS.len()] {
+        all.into_iter().fold(Default::default(), |mut counts, outcome| {
+            counts[outcome.kind()] += 1;
+            counts
+        })
+    }
 }
 
 /// The truth about all kinds of pixels of a case, and the bounds.
@@ -151,7 +176,7 @@ impl<'a> Judge<'a> {
             let draws = runs * pixels * f64::from(self.case.samples);
             let rare = self.per_test().recip().ln() / draws + 2_f64.powi(-32);
             rounding
-                + self.quantile(means.len()) * (variance / runs).sqrt()
+                + student_t(1.0 - self.per_test(), means.len()) * (variance / runs).sqrt()
                 + rare * truth.range / truth.scale
         };
         let noise = (square / runs / pixels - mean * mean).max(0.0).sqrt();
@@ -168,12 +193,6 @@ impl<'a> Judge<'a> {
 
     fn per_test(&self) -> f64 {
         SIGNIFICANCE / self.tests.max(1) as f64
-    }
-
-    /// Standard errors that a mean over seeds may be off by (Student's t, two-sided).
-    fn quantile(&self, runs: usize) -> f64 {
-        let t = StudentsT::new(0.0, 1.0, runs.saturating_sub(1) as f64);
-        t.map_or(f64::INFINITY, |t| t.inverse_cdf(1.0 - self.per_test() / 2.0))
     }
 }
 

@@ -30,6 +30,7 @@ use crate::gpu::{Gpu, GpuOptions, TOLERANCE};
 use crate::param::Options;
 use crate::picture::Picture;
 use crate::rop::{ReplayOptions, Which};
+use crate::study::engine::EngineName;
 use crate::study::stress::judge::Judge;
 use crate::trace::Trace;
 
@@ -127,6 +128,13 @@ pub struct Agreement {
     pub refused: Option<String>,
 }
 
+impl Agreement {
+    /// Whether the engine is a GPU.
+    pub fn is_gpu(&self) -> bool {
+        self.engine == EngineName::Gpu.name()
+    }
+}
+
 /// What goes with every study: designs alone, on the processor.
 ///
 /// # Errors
@@ -222,14 +230,16 @@ fn findings(
             judge: Judge::new(case, tests)?,
             seeds: plan.seeds,
         };
-        let mut found: Vec<Finding> = designs.par_iter().map(|d| trial.finding(d)).collect();
+        let found: Vec<(Finding, Result<Picture>)> =
+            designs.par_iter().map(|d| trial.finding(d)).collect();
         // One after the other: there is one device.
-        for (finding, design) in found.iter_mut().zip(designs) {
+        for ((mut finding, plain), design) in found.into_iter().zip(designs) {
             if let Some(gpu) = gpu.filter(|_| design.is_ported()) {
-                trial.on_gpu(gpu, design, finding);
+                finding.engines.push(trial.on_gpu(gpu, design, &plain));
             }
+            finding.broken = broken(design, &finding);
+            findings.push(finding);
         }
-        findings.extend(found);
     }
     Ok(findings)
 }
@@ -265,7 +275,8 @@ struct Trial<'a> {
 }
 
 impl Trial<'_> {
-    fn finding(&self, design: &Configured) -> Finding {
+    /// What the processor's engines make of it, and the plain text's first picture.
+    fn finding(&self, design: &Configured) -> (Finding, Result<Picture>) {
         let plain = self.picture(design, Which::Reference, 0);
         let mut finding = Finding {
             case: self.case.name.clone(),
@@ -280,8 +291,7 @@ impl Trial<'_> {
                 finding.engines.push(agreement(name, &plain, self.picture(design, which, 0)));
             }
         }
-        finding.broken = broken(design, &finding);
-        finding
+        (finding, plain)
     }
 
     fn picture(&self, design: &Configured, engine: Which, seed: u32) -> Result<Picture> {
@@ -307,13 +317,10 @@ impl Trial<'_> {
         }
     }
 
-    fn on_gpu(&self, gpu: &Gpu, design: &Configured, finding: &mut Finding) {
+    fn on_gpu(&self, gpu: &Gpu, design: &Configured, plain: &Result<Picture>) -> Agreement {
         let options = GpuOptions::default();
         let replayed = design.replay_on(gpu, &self.trace, self.case.samples, 0, &options);
-        let plain = self.picture(design, Which::Reference, 0);
-        let found = agreement("gpu", &plain, replayed.map(|(r, ..)| r.picture));
-        finding.engines.push(found);
-        finding.broken = broken(design, finding);
+        agreement(EngineName::Gpu.name(), plain, replayed.map(|(r, ..)| r.picture))
     }
 }
 
@@ -365,10 +372,10 @@ fn broken(design: &Configured, finding: &Finding) -> Option<String> {
     }
     let refuses = matches!(finding.outcome, Outcome::Refused { .. });
     finding.engines.iter().find_map(|a| {
-        let allowed = if a.engine == "gpu" { TOLERANCE } else { 0.0 };
+        let allowed = if a.is_gpu() { TOLERANCE } else { 0.0 };
         match (a.difference, &a.refused) {
             (Some(d), _) if d > allowed => Some(format!("{} differs by {d:.2e}", a.engine)),
-            (None, Some(why)) if !refuses && a.engine != "gpu" => {
+            (None, Some(why)) if !refuses && !a.is_gpu() => {
                 Some(format!("{} refuses: {why}", a.engine))
             }
             _ => None,
