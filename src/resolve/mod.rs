@@ -1,13 +1,22 @@
 //! From a pixel's samples to its colour.
 
 /// Box filter: the mean of the samples' colours, summed in sample order in single
-/// precision, so that every implementation rounds alike. Where the sum overflows, the
-/// samples' shares are summed instead: the mean of finite colours is finite.
+/// precision, so that every implementation rounds alike.
+///
+/// Two rules come before the sum's own rounding. Where all samples hold one colour, bit for
+/// bit, that is the pixel's: a pixel that nothing covers keeps the background's bits, whether
+/// or not its tile was touched. Where the sum of a channel overflows, the samples' shares are
+/// summed instead: the mean of finite colours is finite.
 ///
 /// # Panics
 /// Where there are no samples.
+#[inline]
 pub fn box_filter(colours: &[[f32; 3]]) -> [f64; 3] {
-    assert!(!colours.is_empty());
+    let first = colours.first().expect("a pixel has samples");
+    let bits = |colour: &[f32; 3]| colour.map(f32::to_bits);
+    if colours.iter().all(|c| bits(c) == bits(first)) {
+        return first.map(f64::from);
+    }
     let count = colours.len() as f32;
     let mut sum = [0.0_f32; 3];
     for colour in colours {
@@ -24,6 +33,20 @@ pub fn box_filter(colours: &[[f32; 3]]) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_all_samples_hold_is_the_pixel_bit_for_bit() {
+        for value in [0.1, 1.0 / 3.0, 1e-38, 65504.0, f32::MAX, f32::from_bits(1)] {
+            for count in [1, 2, 4, 8, 16, 32, 64] {
+                let colour = [value, 0.3, 0.7];
+                assert_eq!(box_filter(&vec![colour; count]), colour.map(f64::from), "{count}");
+            }
+        }
+        // The sum by itself rounds away from it, and does so for all that differs anywhere.
+        let mut samples = [[0.1_f32, 0.0, 0.0]; 8];
+        samples[0][1] = 1.0;
+        assert!(box_filter(&samples)[0] != f64::from(0.1_f32));
+    }
 
     #[test]
     fn the_mean_is_summed_in_single_precision() {

@@ -434,7 +434,10 @@ impl<S: Sampler<N>, const N: usize> Transparent<N> for Methods<S, N> {
             _ => return,
         };
         match self.method {
-            Method::Basic => samples.colour.iter().for_each(|c| sums.add(*c, 1.0)),
+            // The weight counts what was written: where that is nothing, see `resolve`.
+            Method::Basic => samples.colour.iter().enumerate().for_each(|(s, c)| {
+                sums.add(*c, if sums.occupied.contains(s) { 1.0 } else { 0.0 });
+            }),
             Method::AlphaCorrection => {
                 sums.occupied.iter().for_each(|s| sums.add(samples.colour[s], 1.0));
             }
@@ -456,6 +459,10 @@ impl<S: Sampler<N>, const N: usize> Transparent<N> for Methods<S, N> {
         let Some(sums) = &pixel.sums else {
             return box_filter(&pixel.samples.colour);
         };
+        if self.method == Method::Basic && sums.weight == 0.0 {
+            // Nothing was written in any round: the sum of so many backgrounds is rounded.
+            return box_filter(behind);
+        }
         let samples = N as f64;
         let mean = 1.0 / (samples * f64::from(self.rounds));
         let mut behind_it = [0.0; 3];

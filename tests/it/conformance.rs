@@ -9,7 +9,8 @@ use screendoor::rop::{Family, OpaquePromise, OrderPromise, ReplayOptions, Site};
 use screendoor::trace::{Fragment, SampleMask, Trace, Unorm32, WriteOptions};
 
 use crate::util::{
-    all_variants, design, header, layered, picture, random_fragments, trace, trace_bytes,
+    AWKWARD, all_variants, design, header, layered, nearly_bare, not_bare, picture,
+    random_fragments, trace, trace_bytes,
 };
 
 fn rmse(a: &screendoor::picture::Picture, b: &screendoor::picture::Picture) -> f64 {
@@ -83,6 +84,24 @@ fn an_empty_trace_shows_the_background() {
         let picture = picture(&design, &trace, 8, 0);
         assert_eq!(picture.get(19, 19), [0.25, 0.5, 0.75], "{}", design.label());
     }
+}
+
+#[test]
+fn what_nothing_covers_is_the_background_bit_for_bit_whether_its_tile_is_touched_or_not() {
+    for samples in [1, 2, 4, 8, 16, 32, 64] {
+        for (i, value) in AWKWARD.into_iter().enumerate() {
+            let background = [value, AWKWARD[(i + 1) % AWKWARD.len()], 0.0];
+            let trace = nearly_bare(samples, background);
+            for design in all_variants() {
+                let wrong = not_bare(&picture(&design, &trace, samples, 1), background);
+                let label = design.label();
+                assert!(wrong.is_empty(), "{label} at {samples}, {background:?}: {wrong:?}");
+            }
+        }
+    }
+    // The check can fail: the covered pixels are another colour.
+    let trace = nearly_bare(8, [0.1; 3]);
+    assert!(!not_bare(&picture(&design("exact"), &trace, 8, 1), [0.2; 3]).is_empty());
 }
 
 #[test]

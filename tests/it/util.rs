@@ -144,6 +144,38 @@ pub fn layered(
     fragments
 }
 
+/// Colours that a sum of several of them, in single precision, is rounded away from, and the
+/// ends of what a trace can hold.
+pub const AWKWARD: [f32; 5] = [0.1, 1.0 / 3.0, 0.7, 1e-38, 65504.0];
+
+/// Two tiles over a background: in the first one a transparent fragment that covers a
+/// part of a pixel and an opaque one elsewhere, in the second nothing.
+pub fn nearly_bare(samples: u32, background: [f32; 3]) -> Trace {
+    let header = Header { background, colour: ColourFormat::F32, ..header(16, 8, samples) };
+    let fragment = |x: u16, alpha: f32| Fragment {
+        x,
+        y: 2,
+        coverage: SampleMask::first(samples.div_ceil(2)),
+        depth: DepthPlane { z: Unorm32(1 << 30), dzdx: 0, dzdy: 0 },
+        colour: [1.0, 0.5, 0.25],
+        alpha,
+        primitive: u32::from(x),
+        object: 0,
+    };
+    trace(&header, &[fragment(3, 0.5), fragment(5, 1.0)])
+}
+
+/// The pixels of a picture of [`nearly_bare`] that no fragment covers and that are not the
+/// background, bit for bit.
+pub fn not_bare(picture: &Picture, background: [f32; 3]) -> Vec<(u32, u32, [f64; 3])> {
+    let bits = |colour: [f64; 3]| colour.map(f64::to_bits);
+    let pixels = (0..picture.height()).flat_map(|y| (0..picture.width()).map(move |x| (x, y)));
+    let bare = pixels.filter(|at| ![(3, 2), (5, 2)].contains(at));
+    bare.map(|(x, y)| (x, y, picture.get(x, y)))
+        .filter(|(_, _, colour)| bits(*colour) != bits(background.map(f64::from)))
+        .collect()
+}
+
 /// The GPU, opened once. Where there is none, the tests that ask for it are skipped, and
 /// counted so; with `SCREENDOOR_GPU=require` they fail.
 pub fn gpu() -> Option<&'static Gpu> {

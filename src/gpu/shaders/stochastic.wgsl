@@ -115,7 +115,7 @@ fn inner_end_pass(number: u32) {
     for (var s = 0u; s < SAMPLES; s++) {
         let holds = mask_contains(occupied, s);
         if METHOD_BASIC || (METHOD_ALPHA_CORRECTION && holds) {
-            sums_add(state_colour(AT_COLOUR + 3u * s), 1.0);
+            sums_add(state_colour(AT_COLOUR + 3u * s), select(0.0, 1.0, holds));
         }
         if METHOD_DEPTH && !holds {
             transmittance[s] += 1.0 / f32(ROUNDS);
@@ -134,8 +134,15 @@ fn inner_end_pass(number: u32) {
 fn resolve_pixel() -> vec3<f32> {
     let share = 1.0 / f32(SAMPLES);
     var sum = vec3<f32>(0.0);
+    var differ = 0u;
     for (var s = 0u; s < SAMPLES; s++) {
         sum += state_colour(AT_COLOUR + 3u * s);
+        for (var c = 0u; c < 3u; c++) {
+            differ |= state_word(AT_COLOUR + 3u * s + c) ^ state_word(AT_COLOUR + c);
+        }
+    }
+    if differ == 0u {
+        return state_colour(AT_COLOUR);
     }
     // All bits of the exponent: it has overflowed. Compilers take floats for finite.
     let overflowed = (bitcast<vec3<u32>>(sum) & vec3<u32>(0x7f800000u)) == vec3<u32>(0x7f800000u);
