@@ -91,12 +91,12 @@ impl Error {
     }
 
     /// An [`Error::Config`] about a name that is not among `known`, naming the
-    /// nearest one, or all of them where none is near.
+    /// nearest one, whatever the case of its letters, or all of them where none is near.
     pub fn unknown<'a>(kind: &str, name: &str, known: impl IntoIterator<Item = &'a str>) -> Self {
         let known: Vec<&str> = known.into_iter().collect();
         let nearest = known
             .iter()
-            .map(|k| (strsim::jaro_winkler(name, k), *k))
+            .map(|k| (strsim::jaro_winkler(&name.to_lowercase(), &k.to_lowercase()), *k))
             .max_by(|a, b| a.0.total_cmp(&b.0));
         let hint = match nearest {
             Some((score, k)) if score > 0.75 => format!("did you mean '{k}'?"),
@@ -142,6 +142,10 @@ mod tests {
     fn an_unknown_name_suggests_the_nearest() {
         let error = Error::unknown("design", "endertn", ["exact", "lk", "enderton"]);
         assert_eq!(error.to_string(), "unknown design 'endertn'; did you mean 'enderton'?");
+        for (name, nearest) in [("LK", "lk"), ("Enderton", "enderton"), ("EXCAT", "exact")] {
+            let error = Error::unknown("design", name, ["exact", "lk", "enderton"]).to_string();
+            assert!(error.ends_with(&format!("did you mean '{nearest}'?")), "{error}");
+        }
         let error = Error::unknown("design", "zzz", ["exact", "lk"]);
         assert_eq!(error.to_string(), "unknown design 'zzz'; known: exact, lk");
     }

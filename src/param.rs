@@ -11,15 +11,15 @@ use serde::Serialize;
 
 use crate::error::{Error, Result};
 
-/// One parameter of a design or of a built-in scene.
-#[derive(Clone, Copy, Debug, Serialize)]
+/// One parameter of a design or of a built-in scene. Written with its default as a value of
+/// its kind, not as text.
+#[derive(Clone, Copy, Debug)]
 pub struct Param {
     /// Its name, as in `--set name=value`.
     pub name: &'static str,
     /// Its value where none is given, as it would be written.
     pub default: &'static str,
     /// What values it takes.
-    #[serde(flatten)]
     pub kind: Kind,
     /// One line for the reader of a listing.
     pub help: &'static str,
@@ -190,16 +190,29 @@ macro_rules! options {
     };
 }
 
-/// The value of a parameter.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-#[serde(untagged)]
+impl Serialize for Param {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        #[derive(Serialize)]
+        struct Shown<'a> {
+            name: &'a str,
+            default: Value,
+            #[serde(flatten)]
+            kind: &'a Kind,
+            help: &'a str,
+        }
+        let default = self.parse(self.default, self.name).map_err(serde::ser::Error::custom)?;
+        Shown { name: self.name, default, kind: &self.kind, help: self.help }.serialize(serializer)
+    }
+}
+
+/// The value of a parameter. Written as what it is: a number, true or false, or a name.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Value {
     /// Of a [`Kind::Flag`].
     Flag(bool),
     /// Of a [`Kind::Choice`].
     Choice {
         /// The option's place in its enumeration.
-        #[serde(skip)]
         index: usize,
         /// The option's name.
         name: &'static str,
@@ -217,6 +230,17 @@ impl fmt::Display for Value {
             Value::Choice { name, .. } => f.write_str(name),
             Value::Integer(v) => v.fmt(f),
             Value::Real(v) => v.fmt(f),
+        }
+    }
+}
+
+impl Serialize for Value {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Value::Flag(v) => serializer.serialize_bool(*v),
+            Value::Choice { name, .. } => serializer.serialize_str(name),
+            Value::Integer(v) => serializer.serialize_i64(*v),
+            Value::Real(v) => serializer.serialize_f64(*v),
         }
     }
 }
@@ -327,7 +351,7 @@ impl Values {
 
 impl Serialize for Values {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_map(self.values.iter().map(|(k, v)| (k, v.to_string())))
+        serializer.collect_map(&self.values)
     }
 }
 
@@ -388,6 +412,17 @@ mod tests {
     }
 
     #[test]
+    fn values_and_defaults_are_written_as_what_they_are() {
+        let values = serde_json::to_value(resolve("it:count=9").unwrap()).unwrap();
+        let right = serde_json::json!({ "sort": true, "colour": "red", "count": 9, "alpha": 0.5 });
+        assert_eq!(values, right);
+        let defaults: Vec<_> = PARAMS.iter().map(|p| serde_json::to_value(p).unwrap()).collect();
+        assert_eq!(defaults[2]["default"], 3);
+        assert_eq!((&defaults[2]["type"], &defaults[2]["max"]), (&"integer".into(), &9.into()));
+        assert_eq!((&defaults[0]["default"], &defaults[3]["default"]), (&true.into(), &0.5.into()));
+    }
+
+    #[test]
     fn bad_settings_say_what_would_be_good() {
         let message = |text: &str| resolve(text).unwrap_err().to_string();
         assert_eq!(
@@ -406,6 +441,8 @@ mod tests {
             message("it:colour=bleu"),
             "unknown value of it's parameter 'colour': 'bleu'; did you mean 'blue'?"
         );
+        assert!(message("it:Sort=true").ends_with("did you mean 'sort'?"));
+        assert!(message("it:colour=BLUE").ends_with("did you mean 'blue'?"));
         assert_eq!(message("it:count"), "'count' is not a setting; write it as name=value");
         assert_eq!(
             message("it:count=1,count=2"),

@@ -3,34 +3,56 @@
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-use clap::Args;
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::builder::{PossibleValue, StringValueParser, TypedValueParser};
+use clap::{Arg, Args, Command};
 
 use crate::cli::console::Console;
 use crate::cli::files::open_trace;
 use crate::design::{Configured, configure};
 use crate::error::{Error, Result};
-use crate::param::{Options, parse_setting};
+use crate::param::{Choice, Options, parse_setting};
 use crate::scene;
 use crate::study::engine::EngineName;
 use crate::trace::{SamplePattern, Trace};
 
+/// A parser for names of a list, of which a wrong one is told the nearest.
+#[derive(Clone)]
+struct Named<T>(Vec<(Choice, T)>);
+
+impl<T: Copy + Send + Sync + 'static> TypedValueParser for Named<T> {
+    type Value = T;
+
+    fn parse_ref(
+        &self,
+        command: &Command,
+        argument: Option<&Arg>,
+        value: &OsStr,
+    ) -> Result<T, clap::Error> {
+        let list = self.0.clone();
+        let find = move |name: String| {
+            let found = list.iter().find(|(choice, _)| choice.name == name);
+            let known = list.iter().map(|(choice, _)| choice.name);
+            found.map(|(_, value)| *value).ok_or_else(|| {
+                let error = Error::unknown("name", &name, known.clone());
+                format!("{error} [possible values: {}]", known.collect::<Vec<_>>().join(", "))
+            })
+        };
+        StringValueParser::new().try_map(find).parse_ref(command, argument, value)
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        Some(Box::new(self.0.iter().map(|(c, _)| PossibleValue::new(c.name).help(c.help))))
+    }
+}
+
 /// A parser for an enumeration of [`Options`]: the names and helps are its own.
 pub(super) fn option<C: Options + Send + Sync>() -> impl TypedValueParser<Value = C> {
-    let values = C::CHOICES.iter().map(|c| PossibleValue::new(c.name).help(c.help));
-    PossibleValuesParser::new(values).map(|name| {
-        let index = C::CHOICES.iter().position(|c| c.name == name);
-        C::ALL[index.expect("the parser lets only the names pass")]
-    })
+    Named(C::CHOICES.iter().copied().zip(C::ALL.iter().copied()).collect())
 }
 
 /// A parser for an engine's name.
 pub(super) fn engine_name() -> impl TypedValueParser<Value = EngineName> {
-    let values = EngineName::all().map(|(_, c)| PossibleValue::new(c.name).help(c.help));
-    PossibleValuesParser::new(values).map(|name| {
-        let named = EngineName::all().find(|(_, c)| c.name == name);
-        named.expect("the parser lets only the names pass").0
-    })
+    Named(EngineName::all().map(|(name, choice)| (choice, name)).collect())
 }
 
 /// The designs of a list such as `lk,slab:layers=4,bits=8,enderton`: what is a setting and

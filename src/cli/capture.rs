@@ -4,14 +4,17 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use serde::Serialize;
 
 use crate::capture::{CameraOptions, Capture, CaptureOptions, Faces, Order, PatternKind};
 use crate::cli::arguments::{self, colour, numbers, option, samples, size};
 use crate::cli::console::{Console, grouped, shown, table};
-use crate::cli::files::{check, check_scene};
+use crate::cli::files::{JsonArgument, check, check_scene, report};
+use crate::cli::kind::{Kind, check_output};
+use crate::cli::signals::on_interrupt;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::gpu::capture::GpuCapture;
+use crate::gpu::capture::{CrossCheck, GpuCapture};
 use crate::output::OutputFile;
 use crate::scene::{self, Scene};
 use crate::trace::{
@@ -31,8 +34,8 @@ pub(super) struct Arguments {
     /// Frame size in pixels
     #[arg(long, default_value = "800x800", value_name = "WxH", value_parser = size)]
     size: (u32, u32),
-    /// Samples per pixel: 64 where not given, 4 with --gpu; a trace of 64 serves every
-    /// smaller count too
+    /// Samples per pixel: 64 where not given, 4 with --gpu, 16 with --pattern standard; a
+    /// trace of 64 serves every smaller count too
     #[arg(long, value_name = "N", value_parser = samples, allow_negative_numbers = true)]
     samples: Option<u32>,
     /// Where the samples lie
@@ -83,6 +86,22 @@ pub(super) struct Arguments {
     /// Draw with our own rasteriser too, and print where the two differ
     #[arg(long, requires = "gpu")]
     check: bool,
+    #[command(flatten)]
+    json: JsonArgument,
+}
+
+#[derive(Serialize)]
+struct Document<'a> {
+    trace: String,
+    scene: &'a str,
+    width: u32,
+    height: u32,
+    samples: u32,
+    fragments: u64,
+    bytes: u64,
+    content: &'a str,
+    /// With `--check`: where the GPU's rasteriser and ours differ.
+    check: Option<CrossCheck>,
 }
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
@@ -93,16 +112,23 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
             "name a file (./- for one that is called so)",
         ));
     }
-    // A machine without a GPU is told before anything is done.
+    // A misspelt name and a machine without a GPU are told before anything is done.
+    scene::check(source)?;
     let gpu = arguments.gpu.then(|| Gpu::open(arguments.adapter.as_deref())).transpose()?;
     let inputs: Vec<&Path> = path.into_iter().chain(arguments.texture.as_deref()).collect();
-    check(&inputs, &[&arguments.output])?;
+    let outputs: Vec<&Path> =
+        [&*arguments.output].into_iter().chain(arguments.json.path()).collect();
+    check(&inputs, &outputs)?;
+    check_output(&arguments.output, Kind::Trace)?;
     let file = OutputFile::create(&arguments.output)?;
+    let json = arguments.json.open()?;
+    let loading = console.progress("loading the scene", "");
     let mut scene = scene::load(source)?;
+    drop(loading);
     if let Some(texture) = &arguments.texture {
         scene.apply_texture(texture)?;
     }
-    check_scene(&scene, &[&arguments.output])?;
+    check_scene(&scene, &outputs)?;
     if arguments.white {
         scene.whiten();
     }
@@ -110,7 +136,12 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let options = CaptureOptions {
         width,
         height,
-        samples: arguments.samples.unwrap_or(if arguments.gpu { 4 } else { 64 }),
+        samples: arguments.samples.unwrap_or(match arguments.pattern {
+            _ if arguments.gpu => 4,
+            // The largest there is.
+            PatternKind::Standard => 16,
+            _ => 64,
+        }),
         pattern: arguments.pattern,
         alpha: arguments.alpha,
         order: arguments.order,
@@ -125,24 +156,40 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         },
     };
     let write = WriteOptions { compression: arguments.compress, ..WriteOptions::default() };
-    let written = match &gpu {
-        None => record(&scene, &options, write, file, console)?,
+    let (written, differences) = match &gpu {
+        None => (record(&scene, &options, write, file, console)?, None),
         Some(gpu) => {
             let capture = GpuCapture::new(gpu, &scene, &options)?;
             let recorded = record_by_gpu(&scene, &capture, write, file, console)?;
-            if arguments.check {
-                cross_check(&capture, console)?;
-            }
-            recorded
+            let found = arguments.check.then(|| cross_check(&capture, console)).transpose()?;
+            (recorded, found)
         }
     };
-    console.print(format_args!(
-        "{}: {} fragments, {:.1} MB, content {}",
-        shown(arguments.output.display()),
-        grouped(written.rows),
-        written.bytes as f64 / 1e6,
-        &written.content[..16],
-    ))
+    let document = Document {
+        trace: arguments.output.display().to_string(),
+        scene: &scene.source,
+        width,
+        height,
+        samples: options.samples,
+        fragments: written.rows,
+        bytes: written.bytes,
+        content: &written.content,
+        check: differences,
+    };
+    report(json, "screendoor.capture", &document, console, || {
+        if let Some(found) = differences {
+            let rows = found.rows().map(|(what, count)| vec![what.to_string(), count]);
+            let header = ["our rasteriser against the GPU's", ""];
+            console.print(format_args!("{}", table(&header, rows.into())))?;
+        }
+        console.print(format_args!(
+            "{}: {} fragments, {:.1} MB, content {}",
+            shown(&document.trace),
+            grouped(written.rows),
+            written.bytes as f64 / 1e6,
+            &written.content[..16],
+        ))
+    })
 }
 
 /// Captures `scene` into `file` and puts it in its place, with the scene's warnings.
@@ -191,20 +238,20 @@ fn into_file(
     drop(progress);
     let (file, written) = writer.finish()?;
     file.commit()?;
+    on_interrupt(format_args!("{place} is whole and kept"));
     if written.rows == 0 {
         console.warn(&format!("the trace has no fragments: {}", why_empty(header)));
     }
     Ok(written)
 }
 
-/// Prints where the GPU's rasteriser and ours differ.
-fn cross_check(capture: &GpuCapture<'_>, console: &Console) -> Result<()> {
+/// Where the GPU's rasteriser and ours differ.
+fn cross_check(capture: &GpuCapture<'_>, console: &Console) -> Result<CrossCheck> {
     let progress = console.progress("comparing", "triangles");
     let pattern = &capture.header().pattern;
     let found = capture.check(pattern, |done, total| progress.set(done, total))?;
     drop(progress);
-    let rows = found.rows().map(|(what, count)| vec![what.to_string(), count]);
-    console.print(format_args!("{}", table(&["our rasteriser against the GPU's", ""], rows.into())))
+    Ok(found)
 }
 
 /// Why nothing was drawn, as far as it is known.

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use crate::cli::console::Console;
-use crate::cli::files::{Json, check, report};
+use crate::cli::files::{JsonArgument, check, report};
+use crate::cli::kind::{Kind, check_input};
 use crate::error::{Error, Result};
 use crate::metrics::{Errors, Region, errors};
 use crate::picture::{Layer, Picture, PictureFile, read};
@@ -26,9 +27,8 @@ pub(super) struct Arguments {
     /// Write the difference as an EXR file
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Write the figures as JSON to a file, or to standard output for -
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonArgument,
 }
 
 #[derive(serde::Serialize)]
@@ -43,8 +43,10 @@ struct Document {
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let outputs: Vec<&Path> =
-        arguments.output.as_deref().into_iter().chain(Json::path(&arguments.json)).collect();
+        arguments.output.as_deref().into_iter().chain(arguments.json.path()).collect();
     check(&[&arguments.picture, &arguments.reference], &outputs)?;
+    check_input(&arguments.picture, Kind::Picture)?;
+    check_input(&arguments.reference, Kind::Picture)?;
     if let Some(path) = &arguments.output {
         check_difference(path)?;
     }
@@ -69,7 +71,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     check_finite(&arguments.reference, &b)?;
     let create = |path| PictureFile::create(path, a.width(), a.height());
     let output = arguments.output.as_ref().map(create).transpose()?;
-    let json = Json::open(&arguments.json)?;
+    let json = arguments.json.open()?;
     let e = errors(&a, &b, &Region::frame(a.grid()));
     let identical = a.hash() == b.hash();
     let saved = output.map_or(Ok(()), |mut file| {
@@ -85,7 +87,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         identical,
         errors: e,
     };
-    let reported = report(json, &document, console, || {
+    let reported = report(json, "screendoor.compare", &document, console, || {
         let line = |name: &str, value: f64| console.print(format_args!("{name:<22}{value:>12.4}"));
         console.print(format_args!("errors in 8-bit units over {} pixels", e.pixels))?;
         line("RMSE, linear", e.rmse)?;

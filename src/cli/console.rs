@@ -5,8 +5,8 @@ use std::fmt::{Arguments, Display};
 use std::io::{self, Write};
 
 use comfy_table::{CellAlignment, Table, presets};
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use crate::cli::progress::Progress;
 use crate::error::{Error, Result};
 
 /// The user's terminal.
@@ -61,52 +61,19 @@ impl Console {
         }
     }
 
-    /// A progress bar on standard error: none where that is no terminal.
-    pub fn progress(&self, what: &str, unit: &str) -> Progress {
-        let target =
-            if self.quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
-        let bar = ProgressBar::with_draw_target(Some(0), target);
-        let template =
-            format!("{{prefix}} [{{bar:30}}] {{human_pos}} of {{human_len}} {unit}, {{eta}} left");
-        bar.set_style(
-            ProgressStyle::with_template(&template)
-                .unwrap_or_else(|_| ProgressStyle::default_bar())
-                .progress_chars("=> "),
-        );
-        bar.set_prefix(what.to_string());
-        Progress { bar }
-    }
-}
-
-/// A progress bar that vanishes when it is dropped.
-pub(super) struct Progress {
-    bar: ProgressBar,
-}
-
-impl Progress {
-    /// Shows that `done` of `total` is done.
-    pub fn set(&self, done: u64, total: u64) {
-        let begins = self.bar.length() == Some(0);
-        self.bar.set_length(total);
-        self.bar.set_position(done);
-        if begins {
-            // What had been done before is no measure of the time left.
-            self.bar.reset_eta();
+    /// Tells what is to be known beforehand, to standard error.
+    pub fn note(&self, text: Arguments<'_>) {
+        if !self.quiet {
+            let _ = writeln!(io::stderr().lock(), "screendoor: {}", shown(text));
         }
     }
 
-    /// Shows another name for what is done.
-    pub fn name(&self, what: &str) {
-        self.bar.set_prefix(what.to_string());
+    /// What a long command shows of itself on standard error: a bar where that is a
+    /// terminal, and else a line now and then. Nothing of either with --quiet.
+    pub fn progress(&self, what: &str, unit: &str) -> Progress {
+        Progress::new(self.quiet, what, unit)
     }
 }
-
-impl Drop for Progress {
-    fn drop(&mut self) {
-        self.bar.finish_and_clear();
-    }
-}
-
 /// A table of text: the first column to the left, the others to the right.
 pub(super) fn table(header: &[&str], rows: Vec<Vec<String>>) -> Table {
     let mut table = Table::new();

@@ -10,7 +10,8 @@ use crate::capture::CaptureOptions;
 use crate::cli::arguments;
 use crate::cli::capture::record;
 use crate::cli::console::{Console, grouped, shown, table};
-use crate::cli::files::{Json, check, check_scene, report, write_pictures};
+use crate::cli::files::{Json, JsonArgument, check, check_scene, report, write_pictures};
+use crate::cli::kind::{Kind, check_output};
 use crate::design::{Configured, configure};
 use crate::error::{Error, Result};
 use crate::output::OutputFile;
@@ -30,9 +31,8 @@ pub(super) struct Arguments {
     /// The scene
     #[arg(long, default_value = "builtin:engine", value_name = "SCENE")]
     scene: OsString,
-    /// Write the figures as JSON to a file, or to standard output for -
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonArgument,
 }
 
 const SAMPLES: [u32; 3] = [4, 8, 16];
@@ -54,19 +54,21 @@ struct Document<'a> {
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let folder = &arguments.output;
     let (source, scene_path) = arguments::scene(&arguments.scene)?;
+    check_output(folder, Kind::Folder)?;
+    scene::check(source)?;
     let designs = DESIGNS.map(|d| configure(d, &[])).into_iter().collect::<Result<Vec<_>>>()?;
     let plan = Plan { designs, samples: SAMPLES.to_vec(), seeds: SEEDS };
     let path = folder.join("trace.arrow");
     // Before the check: names of files are compared within folders that exist.
     std::fs::create_dir_all(folder).map_err(|e| Error::io("create", folder, e))?;
     let names = picture_paths(folder, &plan.designs);
-    let outputs = names.iter().chain([&path]).map(|p| &**p).chain(Json::path(&arguments.json));
+    let outputs = names.iter().chain([&path]).map(|p| &**p).chain(arguments.json.path());
     let outputs: Vec<&Path> = outputs.collect();
     check(scene_path.as_slice(), &outputs)?;
     let file = OutputFile::create(&path)?;
     let create = |path| PictureFile::create(path, SIDE, SIDE);
     let files = names.iter().map(create).collect::<Result<Vec<_>>>()?;
-    let json = Json::open(&arguments.json)?;
+    let json = arguments.json.open()?;
     // Standard output holds either JSON or text. Where nobody reads it any more the
     // files are written all the same.
     let aloud = !matches!(json, Some(Json::Standard));
@@ -77,7 +79,9 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         }
     };
 
+    let loading = console.progress("loading the scene", "");
     let scene = scene::load(source)?;
+    drop(loading);
     check_scene(&scene, &outputs)?;
     let options = CaptureOptions { width: SIDE, height: SIDE, ..CaptureOptions::default() };
     let fragments = record(&scene, &options, WriteOptions::default(), file, console)?.rows;
@@ -122,7 +126,9 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         runs: measured.runs.iter().map(|m| &m.run).collect(),
     };
     // The text has been printed.
-    let reported = json.map_or(Ok(()), |json| report(Some(json), &document, console, || Ok(())));
+    let reported = json.map_or(Ok(()), |json| {
+        report(Some(json), "screendoor.demo", &document, console, || Ok(()))
+    });
     saved.and(reported).and(said)
 }
 

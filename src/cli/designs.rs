@@ -1,11 +1,9 @@
 //! `screendoor designs`.
 
-use std::path::PathBuf;
-
 use clap::Args;
 
 use crate::cli::console::Console;
-use crate::cli::files::{Json, report};
+use crate::cli::files::{JsonArgument, report};
 use crate::design::{DESIGNS, Entry};
 use crate::error::Result;
 use crate::param::{Kind, Options as _, Param};
@@ -14,9 +12,13 @@ use crate::rop::{Family, Info, Promises};
 /// List the designs with their citations and parameters
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// Write the list as JSON to a file, or to standard output for -
-    #[arg(long, value_name = "FILE", num_args = 0..=1, default_missing_value = "-")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonArgument,
+}
+
+#[derive(serde::Serialize)]
+struct List<'a> {
+    designs: &'a [Document],
 }
 
 #[derive(serde::Serialize)]
@@ -30,13 +32,14 @@ struct Document {
 }
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
-    let json = Json::open(&arguments.json)?;
+    let json = arguments.json.open()?;
     let document = |entry: &Entry| -> Result<Document> {
         let promises = entry.configure(&[])?.promises();
         Ok(Document { info: entry.info, promises, gpu: entry.is_ported() })
     };
     let documents = DESIGNS.iter().map(document).collect::<Result<Vec<_>>>()?;
-    report(json, &documents, console, || print(&documents, console))
+    let list = List { designs: &documents };
+    report(json, "screendoor.designs", &list, console, || print(&documents, console))
 }
 
 fn print(documents: &[Document], console: &Console) -> Result<()> {

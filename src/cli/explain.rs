@@ -1,12 +1,12 @@
 //! `screendoor explain`.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use clap::Args;
 
 use crate::cli::arguments::{RunArguments, numbers};
 use crate::cli::console::{Console, shown};
-use crate::cli::files::{Json, check, report};
+use crate::cli::files::{JsonArgument, check, report};
 use crate::error::{Error, Result};
 use crate::rop::{Contents, Site, Step};
 use crate::study::explained::Explained;
@@ -23,13 +23,12 @@ pub(super) struct Arguments {
     /// Show only the last N fragments
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     last: Option<usize>,
-    /// Write it as JSON to a file, or to standard output for -
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonArgument,
 }
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
-    let outputs: Vec<&Path> = Json::path(&arguments.json).into_iter().collect();
+    let outputs: Vec<&Path> = arguments.json.path().into_iter().collect();
     check(&[arguments.run.path()], &outputs)?;
     let (design, trace, samples) = arguments.run.open(console)?;
     let seed = arguments.run.seed;
@@ -40,7 +39,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         })
     };
     let site = Site { x: coordinate(arguments.pixel[0])?, y: coordinate(arguments.pixel[1])? };
-    let json = Json::open(&arguments.json)?;
+    let json = arguments.json.open()?;
     let progress = console.progress("searching", "fragments");
     let watch = |done, total| progress.set(done, total);
     let place = (&trace, trace.place());
@@ -52,7 +51,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let left_out = arguments.last.map_or(0, |last| all.saturating_sub(last));
     let before = explanation.steps.drain(..left_out).next_back().map(|step| step.contents);
     let explanation = &document.explanation;
-    report(json, &document, console, || {
+    report(json, "screendoor.explain", &document, console, || {
         console.print(format_args!(
             "{} at pixel {},{} of {}: {samples} samples, seed {}",
             design.label(),

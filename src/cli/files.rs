@@ -4,9 +4,11 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use clap::Args;
 use serde::Serialize;
 
 use crate::cli::console::Console;
+use crate::cli::kind::{Kind, check_input, check_output};
 use crate::error::{Error, Result};
 use crate::output::{OutputFile, same_file};
 use crate::picture::{Layer, Picture, PictureFile};
@@ -17,6 +19,8 @@ use crate::trace::Trace;
 /// another output: writing it would destroy what was read or written before.
 pub(super) fn check(inputs: &[&Path], outputs: &[&Path]) -> Result<()> {
     if let Some(input) = inputs.iter().find(|i| i.is_dir()) {
+        let of_study = input.join("study.toml").is_file();
+        of_study.then(|| check_input(input, Kind::Trace)).transpose()?;
         let why = io::Error::new(io::ErrorKind::IsADirectory, "it is a folder; name a file");
         return Err(Error::io("read", input, why));
     }
@@ -68,13 +72,42 @@ pub(super) fn write_pictures(
     files.iter_mut().try_for_each(|file| file.write(&layers))
 }
 
-/// Opens a trace; warns of one without checksums.
+/// Opens a trace; warns of one without checksums. What is plainly something else is refused
+/// with what to do with it.
 pub(super) fn open_trace(path: &Path, console: &Console) -> Result<Trace> {
+    check_input(path, Kind::Trace)?;
     let trace = Trace::open(path)?;
     if !trace.is_sealed() {
         console.warn(&format!("{}: written without checksums by another program", trace.place()));
     }
     Ok(trace)
+}
+
+/// Where a command writes its figures as JSON; the same for every command.
+#[derive(Debug, Args)]
+pub(super) struct JsonArgument {
+    /// Write the figures as JSON to a file, or to standard output for -
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+impl JsonArgument {
+    /// The path of the file, if it is one; none for standard output.
+    pub fn path(&self) -> Option<&Path> {
+        self.json.as_deref().filter(|path| *path != Path::new("-"))
+    }
+
+    /// Opens it.
+    pub fn open(&self) -> Result<Option<Json>> {
+        match (&self.json, self.path()) {
+            (None, _) => Ok(None),
+            (Some(_), None) => Ok(Some(Json::Standard)),
+            (Some(_), Some(path)) => {
+                check_output(path, Kind::Json)?;
+                Ok(Some(Json::File(OutputFile::create(path)?)))
+            }
+        }
+    }
 }
 
 /// Where a command's JSON goes, open from the start.
@@ -85,33 +118,36 @@ pub(super) enum Json {
     File(OutputFile),
 }
 
-impl Json {
-    /// The path of the file that --json names; none for standard output.
-    pub fn path(argument: &Option<PathBuf>) -> Option<&Path> {
-        argument.as_deref().filter(|path| *path != Path::new("-"))
-    }
-
-    /// Opens what --json names.
-    pub fn open(argument: &Option<PathBuf>) -> Result<Option<Self>> {
-        match (argument, Self::path(argument)) {
-            (None, _) => Ok(None),
-            (Some(_), None) => Ok(Some(Json::Standard)),
-            (Some(_), Some(path)) => Ok(Some(Json::File(OutputFile::create(path)?))),
-        }
-    }
+/// The name and the version of a document: a version goes up where a reader of the one
+/// before would be misled.
+#[derive(Clone, Copy, Serialize)]
+struct Schema {
+    name: &'static str,
+    version: u32,
 }
 
-/// Writes `value` as JSON where that is asked for, and otherwise calls `text`: it
-/// is called too where the file cannot be written, so that no work is lost.
+#[derive(Serialize)]
+struct Versioned<'a, T> {
+    schema: Schema,
+    #[serde(flatten)]
+    document: &'a T,
+}
+
+/// Writes `document` as JSON where that is asked for, with `schema` as its name, and otherwise
+/// calls `text`: it is called too where the file cannot be written, so that no work is lost.
 pub(super) fn report(
     json: Option<Json>,
-    value: &impl Serialize,
+    schema: &'static str,
+    document: &impl Serialize,
     console: &Console,
     text: impl FnOnce() -> Result<()>,
 ) -> Result<()> {
     let Some(json) = json else { return text() };
-    let mut bytes = serde_json::to_vec_pretty(value)
-        .map_err(|e| Error::io("write", "the JSON", io::Error::other(e)))?;
+    let mut bytes = serde_json::to_vec_pretty(&Versioned {
+        schema: Schema { name: schema, version: 1 },
+        document,
+    })
+    .map_err(|e| Error::io("write", "the JSON", io::Error::other(e)))?;
     bytes.push(b'\n');
     match json {
         Json::Standard => console.write(&bytes),

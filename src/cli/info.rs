@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use crate::cli::console::{Console, grouped, shown};
-use crate::cli::files::{Json, check, open_trace, report};
+use crate::cli::files::{JsonArgument, check, open_trace, report};
 use crate::error::Result;
 use crate::trace::{Header, Statistics, Trace, statistics};
 
@@ -14,9 +14,8 @@ use crate::trace::{Header, Statistics, Trace, statistics};
 pub(super) struct Arguments {
     /// The trace
     trace: PathBuf,
-    /// Write the figures as JSON to a file, or to standard output for -
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonArgument,
 }
 
 #[derive(serde::Serialize)]
@@ -30,10 +29,10 @@ struct Document<'a> {
 }
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
-    let outputs: Vec<&Path> = Json::path(&arguments.json).into_iter().collect();
+    let outputs: Vec<&Path> = arguments.json.path().into_iter().collect();
     check(&[&arguments.trace], &outputs)?;
     let trace = open_trace(&arguments.trace, console)?;
-    let json = Json::open(&arguments.json)?;
+    let json = arguments.json.open()?;
     let progress = console.progress("counting", "fragments");
     let mut done = 0;
     let stats = statistics(&trace, |rows| {
@@ -49,7 +48,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         batches: trace.batch_count(),
         statistics: &stats,
     };
-    report(json, &document, console, || print(&trace, &stats, console))
+    report(json, "screendoor.info", &document, console, || print(&trace, &stats, console))
 }
 
 fn print(trace: &Trace, stats: &Statistics, console: &Console) -> Result<()> {
@@ -103,12 +102,13 @@ fn print(trace: &Trace, stats: &Statistics, console: &Console) -> Result<()> {
             depth.mean, depth.median, depth.p95, depth.max
         ),
     )?;
-    line("layers", format!("{:.2} per sample of the covered pixels", stats.layers))?;
+    console.print(format_args!("  pixels by their fragments"))?;
     for (i, n) in depth.histogram.iter().enumerate() {
         let low = if i == 0 { 1 } else { (1_u64 << (i - 1)) + 1 };
         let range = if low >= 1 << i { format!("{low}") } else { format!("{low}-{}", 1_u64 << i) };
-        line(&format!("  {range}"), bar(*n, stats.covered_pixels, "pixels"))?;
+        line(&format!("    {range}"), bar(*n, stats.covered_pixels))?;
     }
+    line("layers", format!("{:.2} per sample of the covered pixels", stats.layers))?;
     line(
         "alpha",
         format!(
@@ -120,9 +120,10 @@ fn print(trace: &Trace, stats: &Statistics, console: &Console) -> Result<()> {
             grouped(stats.alpha.opaque)
         ),
     )?;
+    console.print(format_args!("  fragments by their alpha"))?;
     for (i, n) in stats.alpha.histogram.iter().enumerate() {
-        let range = format!("  {:.1}-{:.1}", i as f64 / 10.0, (i + 1) as f64 / 10.0);
-        line(&range, bar(*n, stats.fragments, "fragments"))?;
+        let range = format!("    {:.1}-{:.1}", i as f64 / 10.0, (i + 1) as f64 / 10.0);
+        line(&range, bar(*n, stats.fragments))?;
     }
     if let Some([near, far]) = stats.depth {
         line("depth", format!("{near:.6} to {far:.6} of the range"))?;
@@ -130,14 +131,15 @@ fn print(trace: &Trace, stats: &Statistics, console: &Console) -> Result<()> {
     line("primitives", format!("numbered up to {}", grouped(stats.primitives)))?;
     let more = if stats.objects.more { "more than " } else { "" };
     line("objects", format!("{more}{}", grouped(stats.objects.count as u64)))?;
+    console.print(format_args!("  fragments of the largest objects, by number"))?;
     for (object, n) in &stats.objects.largest {
-        line(&format!("  {object}"), bar(*n, stats.fragments, "fragments"))?;
+        line(&format!("    {object}"), bar(*n, stats.fragments))?;
     }
     Ok(())
 }
 
 /// A bar of up to 30 characters with its figure.
-fn bar(n: u64, whole: u64, unit: &str) -> String {
+fn bar(n: u64, whole: u64) -> String {
     let length = if whole == 0 { 0 } else { (30 * n).div_ceil(whole) as usize };
-    format!("{:<31}{} {unit}", "#".repeat(length), grouped(n))
+    format!("{:<31}{}", "#".repeat(length), grouped(n))
 }

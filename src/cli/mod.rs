@@ -9,6 +9,8 @@ mod designs;
 mod explain;
 mod files;
 mod info;
+mod kind;
+mod progress;
 mod replay;
 mod report;
 mod reproduce;
@@ -68,7 +70,7 @@ enum Command {
 pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let console = Console::new(arguments.quiet);
-    signals::clean_up();
+    signals::clean_up(arguments.quiet);
     match run(&arguments, &console) {
         Ok(()) => {}
         Err(error) if console::nobody_reads(&error) => {}

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::cli::arguments::{RunArguments, engine_name};
 use crate::cli::console::{Console, grouped, shown};
-use crate::cli::files::{Json, check, report, write_pictures};
+use crate::cli::files::{JsonArgument, check, report, write_pictures};
 use crate::design::{Configured, REFERENCE, configure};
 use crate::error::Result;
 use crate::metrics::{Ensemble, EnsembleErrors, PixelClasses, Region};
@@ -33,9 +33,8 @@ pub(super) struct Arguments {
     /// A picture to write, .exr or .png; can be given several times
     #[arg(long, short, value_name = "FILE")]
     output: Vec<PathBuf>,
-    /// Write the results as JSON to a file, or to standard output for -
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonArgument,
     /// What draws; all give the same bits, but that a GPU computes in single precision
     /// where a design blends
     #[arg(long, default_value = "fast", value_name = "ENGINE", value_parser = engine_name())]
@@ -85,7 +84,7 @@ struct ErrorsByRegion {
 }
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
-    let json = Json::path(&arguments.json);
+    let json = arguments.json.path();
     let outputs: Vec<&Path> = arguments.output.iter().map(|o| &**o).chain(json).collect();
     check(&[arguments.run.path()], &outputs)?;
     let (design, trace, samples) = arguments.run.open(console)?;
@@ -93,7 +92,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let header = trace.header();
     let create = |path| PictureFile::create(path, header.width, header.height);
     let mut files = arguments.output.iter().map(create).collect::<Result<Vec<_>>>()?;
-    let json = Json::open(&arguments.json)?;
+    let json = arguments.json.open()?;
     let seed = arguments.run.seed;
     let progress = console.progress("replaying", "fragments");
     let watch = |done, total| progress.set(done, total);
@@ -161,7 +160,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         events: first.events.as_ref(),
         errors,
     };
-    let reported = report(json, &document, console, || {
+    let reported = report(json, "screendoor.replay", &document, console, || {
         let place = shown(trace.place());
         console
             .print(format_args!("{} at {samples} samples, seed {seed}: {place}", design.label()))?;

@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use crate::cli::console::Console;
+use crate::cli::files::JsonArgument;
+use crate::cli::kind::{Kind, check_input};
 use crate::cli::study::{Place, measured, reported};
 use crate::error::Result;
 use crate::study::file::Study;
@@ -25,18 +27,22 @@ pub(super) struct Arguments {
         conflicts_with = "folder"
     )]
     output: PathBuf,
+    #[command(flatten)]
+    json: JsonArgument,
 }
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     if let Some(folder) = &arguments.folder {
-        return reported(&Store::open(folder)?, None, console).map(|_| ());
+        check_input(folder, Kind::Folder)?;
+        let store = Store::open(folder)?;
+        return reported(&store, None, arguments.json.open()?, console).map(|_| ());
     }
-    let store = Store::begin(&arguments.output, &Study::preset()?)?;
     let place = Place {
         base: Path::new(""),
         shard: Shard::WHOLE,
         adapter: None,
+        json: &arguments.json,
         command: format!("screendoor report -o {}", arguments.output.display()),
     };
-    measured(&store, place, console)
+    measured(&arguments.output, &Study::preset()?, place, console)
 }

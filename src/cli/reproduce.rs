@@ -4,21 +4,26 @@ use std::io;
 use std::path::PathBuf;
 
 use clap::Args;
+use serde::Serialize;
 
 use crate::cli::console::{Console, shown};
+use crate::cli::files::{JsonArgument, report};
+use crate::cli::kind::{Kind, check_output};
+use crate::cli::signals::on_interrupt;
 use crate::error::{Error, Result};
 use crate::output::OutputFile;
 use crate::param::Options;
 use crate::picture::write_png;
-use crate::report::{Document, PARTS, document, results};
+use crate::report::{Against, Document, PARTS, document, results};
 use crate::study::file::Publication;
 use crate::study::publications::{Effort, measure_publication};
 
-/// Rerun the publications' experiments and write RESULTS.md with its figures
+/// Rerun the publications' experiments and write RESULTS.md with its figures: hours with what
+/// is the default, most of them for the tables; --part, --side and --seeds make it shorter
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// Where RESULTS.md and the folder 'figures' go
-    #[arg(long, short, default_value = "docs", value_name = "FOLDER")]
+    #[arg(long, short, default_value = "screendoor-results", value_name = "FOLDER")]
     output: PathBuf,
     /// A folder with the models of the tables; without it only the built-in
     /// scenes are measured
@@ -39,6 +44,56 @@ pub(super) struct Arguments {
     /// Measure only this part; the others stay in RESULTS.md as they are
     #[arg(long, value_name = "PART", value_parser = part)]
     part: Option<Publication>,
+    #[command(flatten)]
+    json: JsonArgument,
+}
+
+#[derive(Serialize)]
+struct Written<'a> {
+    results: String,
+    figures: Vec<String>,
+    /// Scenes whose models are not in the models' folder.
+    missing: &'a [&'static str],
+    parts: Vec<Part<'a>>,
+}
+
+#[derive(Serialize)]
+struct Part<'a> {
+    name: &'a str,
+    against: &'a [Against],
+}
+
+/// Minutes on two processors that the parts take with the default effort, roughly: the tables
+/// (their share grows with the pixels and the seeds), the expectations (with theirs), and the
+/// comparison of all designs.
+const MINUTES: [f64; 3] = [90.0, 40.0, 50.0];
+
+/// How long it takes on so many threads, roughly, in minutes.
+fn minutes(effort: Effort, part: Option<Publication>, threads: usize) -> f64 {
+    let square = |side: u32, usual: f64| (f64::from(side) / usual).powi(2);
+    let seeds = f64::from(effort.seeds) / 4.0;
+    let [tables, means, comparison] = MINUTES;
+    let of = |own: Publication| part.is_none_or(|only| only == own);
+    let mut minutes = 0.0;
+    if of(Publication::LaineKarras) {
+        minutes += tables * square(effort.side, 800.0) * seeds;
+    }
+    if of(Publication::Methods) {
+        minutes += means * f64::from(effort.seeds_of_means) / 128.0;
+    }
+    if of(Publication::Comparison) {
+        minutes += comparison * square(effort.comparison_side, 128.0) * seeds;
+    }
+    minutes * 2.0 / threads as f64
+}
+
+/// A time for people, no finer than it is known.
+fn about(minutes: f64) -> String {
+    match minutes {
+        m if m < 1.5 => "a minute".to_string(),
+        m if m < 90.0 => format!("{m:.0} minutes"),
+        m => format!("{:.0} hours", (m / 60.0).ceil()),
+    }
 }
 
 fn part(text: &str) -> std::result::Result<Publication, String> {
@@ -52,10 +107,12 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         let why = "there is no such folder; name the one that holds the models";
         return Err(Error::io("read", models, io::Error::new(io::ErrorKind::NotFound, why)));
     }
+    check_output(&arguments.output, Kind::Folder)?;
     let folder = arguments.output.join("figures");
     std::fs::create_dir_all(&folder).map_err(|e| Error::io("create", &folder, e))?;
     let path = arguments.output.join("RESULTS.md");
     // The work takes hours: that it can be written is found out before.
+    let json = arguments.json.open()?;
     let mut file = OutputFile::create(&path)?;
     drop(OutputFile::create(folder.join("figure.png"))?);
     let before = match std::fs::read_to_string(&path) {
@@ -70,6 +127,13 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         comparison_side: arguments.comparison_side,
         brief: false,
     };
+    let threads = rayon::current_num_threads();
+    console.note(format_args!(
+        "this takes about {} with {threads} threads, very roughly; {} is written at the end",
+        about(minutes(effort, arguments.part, threads)),
+        path.display()
+    ));
+    on_interrupt("nothing was written: what had been measured is lost; --part measures a part");
     let progress = console.progress("reproducing", "steps");
     let models = arguments.models.as_deref();
     let mut documents: Vec<(Publication, Document)> = Vec::new();
@@ -84,13 +148,13 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         documents.push((part, document(&measured, "figures")));
     }
     drop(progress);
-    for missing in missing {
+    for missing in &missing {
         console.warn(&format!("{missing}: not in the models' folder; its table is left out"));
     }
     let text = results(&before, &documents);
-    let pictures: Vec<_> = documents.into_iter().flat_map(|(_, d)| d.figures).collect();
+    let pictures: Vec<_> = documents.iter().flat_map(|(_, d)| &d.figures).collect();
     let save = || {
-        for (name, picture) in &pictures {
+        for (name, picture) in pictures.iter().copied() {
             write_png(folder.join(format!("{name}.png")), picture)?;
         }
         file.write_bytes(text.as_bytes())?;
@@ -101,6 +165,34 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         console.print(format_args!("{text}"))?;
         return Err(error);
     }
-    let (path, count) = (shown(path.display()), pictures.len());
-    console.print(format_args!("{path} and {count} figures"))
+    let written = Written {
+        results: path.display().to_string(),
+        figures: pictures.iter().map(|(name, _)| format!("figures/{name}.png")).collect(),
+        missing: &missing,
+        parts: documents
+            .iter()
+            .map(|(part, d)| Part { name: part.name(), against: &d.against })
+            .collect(),
+    };
+    report(json, "screendoor.reproduce", &written, console, || {
+        console.print(format_args!("{} and {} figures", shown(&written.results), pictures.len()))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_time_follows_the_effort() {
+        let usual =
+            Effort { seeds: 4, seeds_of_means: 128, side: 800, comparison_side: 128, brief: false };
+        assert_eq!(about(minutes(usual, None, 2)), "3 hours");
+        let parts: f64 = PARTS.iter().map(|part| minutes(usual, Some(*part), 2)).sum();
+        assert_eq!(parts, minutes(usual, None, 2));
+        let small = Effort { side: 128, seeds_of_means: 2, comparison_side: 32, seeds: 2, ..usual };
+        assert!(minutes(small, None, 2) < 10.0);
+        assert!(minutes(usual, None, 64) < minutes(usual, None, 2) / 10.0);
+        assert_eq!([about(0.2), about(12.4)], ["a minute", "12 minutes"]);
+    }
 }

@@ -1,13 +1,33 @@
 //! What happens when the user or the system ends the program early.
 
+use std::fmt::Display;
+#[cfg(unix)]
+use std::io::{self, IsTerminal as _, Write as _};
 #[cfg(unix)]
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+/// What an interrupted command has kept.
+static KEPT: Mutex<Option<String>> = Mutex::new(None);
+
+/// Has the program say `text` when it is interrupted. Where no command has said so, nothing
+/// was written.
+pub(super) fn on_interrupt(text: impl Display) {
+    *KEPT.lock().unwrap_or_else(PoisonError::into_inner) = Some(text.to_string());
+}
+
+/// What is said of the end.
+#[cfg(unix)]
+fn kept() -> String {
+    let kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner).take();
+    kept.unwrap_or_else(|| "nothing was written".to_string())
+}
 
 /// Has Ctrl-C, termination and hang-up remove files under construction before
-/// they end the process, as they would have. So does a mapped file of which a part is gone
+/// they end the process, as they would have, and say what was kept. So does a mapped file of which a part is gone
 /// (another program cut it, its disk failed): that is told as an error like any other.
 #[cfg(unix)]
-pub(super) fn clean_up() {
+pub(super) fn clean_up(quiet: bool) {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGUSR2};
     use signal_hook::iterator::Signals;
 
@@ -24,6 +44,12 @@ pub(super) fn clean_up() {
                      more; leave it as it is while it is read, or restore a copy"
                 );
                 signal_hook::low_level::exit(1);
+            }
+            if !quiet {
+                let mut stderr = io::stderr();
+                // A progress bar may stand there.
+                let cleared = if stderr.is_terminal() { "\r\u{1b}[2K" } else { "" };
+                let _ = writeln!(stderr, "{cleared}screendoor: interrupted: {}", kept());
             }
             let _ = signal_hook::low_level::emulate_default_handler(signal);
         }
@@ -93,4 +119,4 @@ fn is_ignored(signal: i32) -> bool {
 
 /// Elsewhere the system ends the process and files under construction stay.
 #[cfg(not(unix))]
-pub(super) fn clean_up() {}
+pub(super) fn clean_up(_quiet: bool) {}

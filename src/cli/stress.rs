@@ -1,11 +1,12 @@
 //! `screendoor stress`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
 use crate::cli::console::{Console, shown, table};
-use crate::cli::files::{Json, report};
+use crate::cli::files::{JsonArgument, check, report};
+use crate::cli::kind::{Kind, check_output};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::output::OutputFile;
@@ -29,9 +30,8 @@ pub(super) struct Arguments {
     /// The GPU to use: a part of its name or of its driver's; without it any, if there is one
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
-    /// Write the findings as JSON to a file, or to standard output for -
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonArgument,
 }
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
@@ -43,7 +43,13 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
             Ok(None)
         }
     };
-    let json = Json::open(&arguments.json)?;
+    let outputs: Vec<&Path> =
+        arguments.output.as_deref().into_iter().chain(arguments.json.path()).collect();
+    check(&[], &outputs)?;
+    if let Some(path) = &arguments.output {
+        check_output(path, Kind::Markdown)?;
+    }
+    let json = arguments.json.open()?;
     let progress = console.progress("trying", "cases");
     let program = std::env::current_exe().map_err(|e| Error::io("find", "this program", e))?;
     let output = arguments.output.as_ref().map(OutputFile::create).transpose()?;
@@ -63,7 +69,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         file.write_bytes(stability(&found, command)?.as_bytes())?;
         file.commit()?;
     }
-    report(json, &found, console, || print(&found, arguments, console))?;
+    report(json, "screendoor.stress", &found, console, || print(&found, arguments, console))?;
     for broken in found.broken() {
         console.error(&Error::config(broken, "this is a fault of screendoor: report it"));
     }

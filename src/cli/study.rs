@@ -3,8 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use serde::Serialize;
 
 use crate::cli::console::{Console, shown};
+use crate::cli::files::{Json, JsonArgument, report};
+use crate::cli::kind::{Kind, check_input, check_output};
+use crate::cli::signals::on_interrupt;
 use crate::error::{Error, Result};
 use crate::output::OutputFile;
 use crate::param::Options;
@@ -13,8 +17,8 @@ use crate::report::html::{DesignText, answer};
 use crate::report::{About, PAGE, document, write_report};
 use crate::study::file::Study;
 use crate::study::publications::{Effort, measure_publication};
-use crate::study::results::Results;
-use crate::study::run::{Runner, Shard, Store, merge};
+use crate::study::results::{Missing, Results};
+use crate::study::run::{Runner, Shard, Store, check, merge};
 
 /// Measure a study: what its file says, run by run, into a folder with a report; called
 /// again it goes on where it was interrupted
@@ -31,6 +35,8 @@ pub(super) struct Arguments {
     /// The GPU to use, where the study asks for one: a part of its name or of its driver's
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
+    #[command(flatten)]
+    json: JsonArgument,
 }
 
 /// Put parts of a study together that were measured with 'study --shard'
@@ -41,6 +47,8 @@ pub(super) struct MergeArguments {
     /// The parts' folders
     #[arg(required = true)]
     parts: Vec<PathBuf>,
+    #[command(flatten)]
+    json: JsonArgument,
 }
 
 fn shard(text: &str) -> std::result::Result<Shard, String> {
@@ -48,28 +56,31 @@ fn shard(text: &str) -> std::result::Result<Shard, String> {
 }
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
+    check_input(&arguments.file, Kind::Study)?;
     let study = Study::read(&arguments.file)?;
-    let base = arguments.file.parent().unwrap_or(Path::new(""));
-    let store = Store::begin(&arguments.output, &study)?;
     let place = Place {
-        base,
+        base: arguments.file.parent().unwrap_or(Path::new("")),
         shard: arguments.shard,
         adapter: arguments.adapter.as_deref(),
+        json: &arguments.json,
         command: format!(
             "screendoor study {} -o {}",
             arguments.file.display(),
             arguments.output.display()
         ),
     };
-    measured(&store, place, console)
+    measured(&arguments.output, &study, place, console)
 }
 
 pub(super) fn run_merge(arguments: &MergeArguments, console: &Console) -> Result<()> {
+    check_output(&arguments.output, Kind::Folder)?;
+    arguments.parts.iter().try_for_each(|part| check_input(part, Kind::Folder))?;
+    let json = arguments.json.open()?;
     let parts = arguments.parts.iter().map(|part| Store::open(part)).collect::<Result<Vec<_>>>()?;
     let Some(first) = parts.first() else { return Ok(()) };
     let store = Store::begin(&arguments.output, first.study())?;
     merge(&store, &parts)?;
-    let results = reported(&store, None, console)?;
+    let results = reported(&store, None, json, console)?;
     let missing = results.missing.len();
     if missing > 0 {
         console.warn(&format!("{missing} runs of the study are in none of the parts"));
@@ -85,12 +96,24 @@ pub(super) struct Place<'a> {
     pub shard: Shard,
     /// The GPU's name.
     pub adapter: Option<&'a str>,
+    /// Where its figures go too.
+    pub json: &'a JsonArgument,
     /// The command that does this.
     pub command: String,
 }
 
-/// Measures what is missing and writes the report.
-pub(super) fn measured(store: &Store, place: Place<'_>, console: &Console) -> Result<()> {
+/// Measures what is missing of `study` in `folder` and writes the report. What can be found
+/// out before is, and then no folder is made.
+pub(super) fn measured(
+    folder: &Path,
+    study: &Study,
+    place: Place<'_>,
+    console: &Console,
+) -> Result<()> {
+    check_output(folder, Kind::Folder)?;
+    check(study, folder, place.base, place.shard, place.adapter)?;
+    let json = place.json.open()?;
+    let store = &Store::begin(folder, study)?;
     let progress = console.progress("measuring", "runs");
     let runner = Runner {
         store,
@@ -98,6 +121,9 @@ pub(super) fn measured(store: &Store, place: Place<'_>, console: &Console) -> Re
         shard: place.shard,
         adapter: place.adapter,
         watch: &|what, done, total| {
+            on_interrupt(format_args!(
+                "{done} of {total} runs are kept; the same command goes on with the others"
+            ));
             progress.name(what);
             progress.set(done, total);
         },
@@ -108,7 +134,7 @@ pub(super) fn measured(store: &Store, place: Place<'_>, console: &Console) -> Re
     for reason in Reason::all(&outcome.failed).iter().chain(&Reason::all(&unpublished)) {
         console.error(&Error::config(reason, "the report shows which as missing"));
     }
-    reported(store, Some(place.command), console).map(|_| ())
+    reported(store, Some(place.command), json, console).map(|_| ())
 }
 
 /// Measures the part's publications that are not there yet. Returns which could not be, and
@@ -169,10 +195,23 @@ impl std::fmt::Display for Reason<'_> {
     }
 }
 
+/// What a study's commands write as JSON; the records are in the folder.
+#[derive(Serialize)]
+struct Document<'a> {
+    study: &'a str,
+    folder: String,
+    report: String,
+    runs: usize,
+    measured: usize,
+    missing: &'a [Missing],
+    answer: Vec<String>,
+}
+
 /// Writes the report and prints its answer.
 pub(super) fn reported(
     store: &Store,
     command: Option<String>,
+    json: Option<Json>,
     console: &Console,
 ) -> Result<Results> {
     let study = store.study();
@@ -190,16 +229,26 @@ pub(super) fn reported(
     }
     let results = write_report(store, about)?;
     // Of a part there is no answer yet.
-    if results.missing.iter().all(|m| m.why.is_some()) {
-        for sentence in answer(&results) {
+    let whole = results.missing.iter().all(|m| m.why.is_some());
+    let document = Document {
+        study: &study.name,
+        folder: store.folder().display().to_string(),
+        report: store.folder().join(PAGE).display().to_string(),
+        runs: store.jobs().len(),
+        measured: results.records.len(),
+        missing: &results.missing,
+        answer: if whole { answer(&results) } else { Vec::new() },
+    };
+    report(json, "screendoor.study", &document, console, || {
+        for sentence in &document.answer {
             console.print(format_args!("{sentence}"))?;
         }
-    }
-    console.print(format_args!(
-        "{} of {} runs; the report is {}",
-        results.records.len(),
-        store.jobs().len(),
-        shown(store.folder().join(PAGE).display())
-    ))?;
+        console.print(format_args!(
+            "{} of {} runs; the report is {}",
+            document.measured,
+            document.runs,
+            shown(&document.report)
+        ))
+    })?;
     Ok(results)
 }

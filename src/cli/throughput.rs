@@ -7,9 +7,10 @@ use serde::Serialize;
 
 use crate::cli::arguments::{design_list, engine_name, option, samples};
 use crate::cli::console::{Console, grouped, shown, table};
-use crate::cli::files::{Json, check, open_trace, report};
+use crate::cli::files::{JsonArgument, check, open_trace, report};
 use crate::error::Result;
 use crate::gpu::{Adapter, Threads};
+use crate::rop::Which;
 use crate::study::engine::EngineName;
 use crate::study::machine::processor;
 use crate::study::throughput::{Plan, Spread, Throughput, measure};
@@ -22,11 +23,12 @@ pub(super) struct Arguments {
     /// The designs, separated by commas, with settings as in 'lk,lk:sort=false,compact=false'
     #[arg(long, default_value = "lk,systematic", value_name = "LIST")]
     designs: String,
-    /// Samples per pixel, separated by commas
-    #[arg(long, default_value = "8", value_name = "LIST", value_delimiter = ',', value_parser = samples)]
+    /// Samples per pixel, separated by commas: 8 where not given, or as many as the trace
+    /// has, if that serves no 8
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = samples)]
     samples: Vec<u32>,
-    /// The engines, separated by commas
-    #[arg(long, default_value = "fast,gpu", value_name = "LIST", value_delimiter = ',', value_parser = engine_name())]
+    /// The engines, separated by commas: 'fast' where not given, and 'gpu' where there is one
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = engine_name())]
     engines: Vec<EngineName>,
     /// The GPU to use: a part of its name or of its driver's
     #[arg(long, value_name = "NAME")]
@@ -37,9 +39,8 @@ pub(super) struct Arguments {
     /// How often each is measured, after one replay that warms up
     #[arg(long, default_value_t = 5, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1000))]
     runs: u16,
-    /// Write the results as JSON to a file, or to standard output for -
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    json: JsonArgument,
 }
 
 #[derive(Serialize)]
@@ -54,22 +55,31 @@ struct Document<'a> {
 }
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
-    check(&[&arguments.trace], &Json::path(&arguments.json).into_iter().collect::<Vec<_>>())?;
+    check(&[&arguments.trace], &arguments.json.path().into_iter().collect::<Vec<_>>())?;
     let designs = design_list(&arguments.designs)?;
     let trace = open_trace(&arguments.trace, console)?;
-    for count in &arguments.samples {
-        trace.header().pattern.prefix(*count)?;
+    let pattern = &trace.header().pattern;
+    let samples = match &arguments.samples[..] {
+        [] if pattern.prefix(8).is_ok() => vec![8],
+        [] => vec![pattern.samples()],
+        given => given.to_vec(),
+    };
+    for count in &samples {
+        pattern.prefix(*count)?;
     }
+    let names = match &arguments.engines[..] {
+        [] => usual_engines(arguments.adapter.as_deref(), console)?,
+        given => given.to_vec(),
+    };
     // An adapter is for the GPU among the engines; without one it is a mistake.
-    let has_gpu = arguments.engines.contains(&EngineName::Gpu);
+    let has_gpu = names.contains(&EngineName::Gpu);
     let open = |name: &EngineName| {
         let adapter = arguments.adapter.as_deref().filter(|_| *name == EngineName::Gpu || !has_gpu);
         Ok((*name, name.open(adapter)?.with_threads(arguments.gpu_threads)))
     };
-    let engines = arguments.engines.iter().map(open).collect::<Result<Vec<_>>>()?;
-    let json = Json::open(&arguments.json)?;
-    let plan =
-        Plan { designs, samples: arguments.samples.clone(), runs: usize::from(arguments.runs) };
+    let engines = names.iter().map(open).collect::<Result<Vec<_>>>()?;
+    let json = arguments.json.open()?;
+    let plan = Plan { designs, samples, runs: usize::from(arguments.runs) };
     let progress = console.progress("measuring", "replays");
     let results = measure(&trace, &engines, &plan, &|name, done, total| {
         progress.name(name);
@@ -85,7 +95,21 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         adapter: engines.iter().find_map(|(_, engine)| engine.adapter()),
         results,
     };
-    report(json, &document, console, || print(&document, console))
+    report(json, "screendoor.throughput", &document, console, || print(&document, console))
+}
+
+/// The engines where none are named: a machine without a GPU is no mistake of the user's,
+/// unless one was named.
+fn usual_engines(adapter: Option<&str>, console: &Console) -> Result<Vec<EngineName>> {
+    let fast = EngineName::Cpu(Which::Fast);
+    match (EngineName::Gpu.open(adapter), adapter) {
+        (Ok(_), _) => Ok(vec![fast, EngineName::Gpu]),
+        (Err(error), Some(_)) => Err(error),
+        (Err(error), None) => {
+            console.warn(&format!("no GPU is measured: {error}"));
+            Ok(vec![fast])
+        }
+    }
 }
 
 /// Millions of things a second.

@@ -80,8 +80,8 @@ pub struct Study {
     #[serde(default)]
     pub publications: Vec<Publication>,
     /// Samples per pixel of the pictures that are kept for the report's viewer; none for
-    /// an empty list.
-    #[serde(default = "defaults::pictures")]
+    /// an empty list, and the one of `samples` that is nearest to 8 where not given.
+    #[serde(default)]
     pub pictures: Vec<u32>,
     /// MiB that a design may take whose state grows with the fragments.
     #[serde(default = "defaults::memory")]
@@ -154,6 +154,9 @@ mod defaults {
     use super::{EngineName, Faces, Metric, Options, Order, PatternKind};
     use crate::rop::Which;
 
+    /// Samples per pixel of the pictures that are kept, where there are so many.
+    pub const PICTURES: u32 = 8;
+
     pub fn seeds() -> u32 {
         8
     }
@@ -165,9 +168,6 @@ mod defaults {
     }
     pub fn metrics() -> Vec<Metric> {
         Metric::ALL.to_vec()
-    }
-    pub fn pictures() -> Vec<u32> {
-        vec![8]
     }
     pub fn memory() -> u64 {
         512
@@ -197,9 +197,8 @@ impl Study {
     /// an unknown key or name the nearest one.
     pub fn parse(text: &str, place: &str) -> Result<Self> {
         let mut study: Study = toml::from_str(text).map_err(|e| explained(&e, text, place))?;
-        if study.baseline.is_empty() {
-            study.baseline = study.designs.first().cloned().unwrap_or_default();
-        }
+        let given: toml::Table = toml::from_str(text).map_err(|e| explained(&e, text, place))?;
+        study.adapt_defaults(&given);
         study.check().map_err(|e| Error::config(format_args!("{place}: {e}"), "correct it"))?;
         Ok(study)
     }
@@ -251,6 +250,27 @@ impl Study {
     /// Whether a metric is asked for.
     pub fn takes(&self, metric: Metric) -> bool {
         self.metrics.contains(&metric)
+    }
+
+    /// What is left out and whose usual value would contradict what is given has another.
+    fn adapt_defaults(&mut self, given: &toml::Table) {
+        if self.baseline.is_empty() {
+            self.baseline = self.designs.first().cloned().unwrap_or_default();
+        }
+        if !given.contains_key("pictures") {
+            // Of two that are as near, the larger.
+            let distance = |n: &u32| (n.abs_diff(defaults::PICTURES), u32::MAX - n);
+            self.pictures = self.samples.iter().copied().min_by_key(distance).into_iter().collect();
+        }
+        let scenes = given.get("scene").and_then(toml::Value::as_array);
+        let most = self.samples.iter().copied().max().unwrap_or_default();
+        for (scene, given) in self.scenes.iter_mut().zip(scenes.into_iter().flatten()) {
+            let standard = scene.pattern == PatternKind::Standard;
+            if standard && given.get("captured_samples").is_none() {
+                // There is no standard pattern of 64.
+                scene.captured_samples = most;
+            }
+        }
     }
 
     fn check(&self) -> Result<()> {
@@ -444,6 +464,22 @@ mod tests {
     }
 
     #[test]
+    fn what_is_left_out_never_contradicts_what_is_given() {
+        for count in [1, 2, 4, 8, 16, 32, 64] {
+            let text = SMALL.replace("[4, 8]", &format!("[{count}]"));
+            assert_eq!(Study::parse(&text, "a.toml").unwrap().pictures, [count]);
+        }
+        for (samples, pictures) in [("[4, 16]", 4), ("[64, 2]", 2), ("[4, 8, 16]", 8)] {
+            let text = SMALL.replace("[4, 8]", samples);
+            assert_eq!(Study::parse(&text, "a.toml").unwrap().pictures, [pictures]);
+        }
+        let none = SMALL.replace("samples =", "pictures = []\nsamples =");
+        assert!(Study::parse(&none, "a.toml").unwrap().pictures.is_empty());
+        let standard = SMALL.replace("[4, 8]", "[8]") + "pattern = 'standard'\n";
+        assert_eq!(Study::parse(&standard, "a.toml").unwrap().scenes[0].captured_samples, 8);
+    }
+
+    #[test]
     fn the_default_study_is_one() {
         let study = Study::preset().unwrap();
         assert_eq!(study.baseline, "enderton");
@@ -474,6 +510,8 @@ mod tests {
             message("name = 'a'", "name = 'a'\nmetrics = ['flop']"),
             "unknown name in a.toml, line 2: 'flop'; did you mean 'flip'?"
         );
+        assert!(message("samples =", "Samples =").ends_with("did you mean 'samples'?"));
+        assert!(message("'lk'", "'LK'").contains("did you mean 'lk'?"));
         assert_eq!(
             message("name = 'a'", "name = 'a'\nengines = ['gpo']"),
             "unknown name in a.toml, line 2: 'gpo'; did you mean 'gpu'?"
@@ -489,7 +527,7 @@ mod tests {
         for (from, to, says) in [
             ("[4, 8]", "[4, 5]", "'samples' cannot be 5"),
             ("[4, 8]", "[4, 4]", "'4' is named twice"),
-            ("[4, 8]", "[4]", "pictures are kept of 8 samples"),
+            ("name = 'a'", "name = 'a'\npictures = [16]", "pictures are kept of 16 samples"),
             ("[4, 8]", "[]", "'samples' is empty"),
             ("'engine'", "'a/b'", "is no name for a scene"),
             ("'engine'", "'..'", "is no name for a scene"),

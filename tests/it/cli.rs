@@ -3,6 +3,7 @@
 mod gpu;
 mod outputs;
 mod study;
+mod traps;
 mod words;
 
 use std::fs;
@@ -178,8 +179,9 @@ fn explain_tells_the_story_of_a_pixel() {
 #[test]
 fn designs_and_scenes_are_listed_from_their_registries() {
     let place = Workplace::new();
-    let list: Value = serde_json::from_str(&place.good(&["designs", "--json"])).unwrap();
+    let list: Value = serde_json::from_str(&place.good(&["designs", "--json", "-"])).unwrap();
     let text = place.good(&["designs"]);
+    let list = &list["designs"];
     for design in list.as_array().unwrap() {
         assert!(text.contains(design["citation"].as_str().unwrap()));
         for param in design["params"].as_array().unwrap() {
@@ -213,14 +215,23 @@ fn wrong_requests_end_with_2_and_a_hint() {
             "an alpha lies in [0, 1]",
         ),
         (
-            &["capture", "builtin:ramps", "-o", "x.arrow", "--pattern", "standard"],
+            &[
+                "capture",
+                "builtin:ramps",
+                "-o",
+                "x.arrow",
+                "--pattern",
+                "standard",
+                "--samples",
+                "64",
+            ],
             "no standard pattern of 64",
         ),
         (&["capture", "builtin:ramps", "-o", "x.arrow", "--fov", "500"], "field of view"),
         (&["capture", "model.step", "-o", "x.arrow"], "do not come as '.step'"),
         (&["explain", "t.arrow", "--pixel", "99,0"], "outside the frame"),
         (&["explain", "t.arrow", "--pixel", "1.5,0"], "no pixel coordinate"),
-        (&["compare", "t.arrow", "t.arrow"], "no picture that can be read"),
+        (&["compare", "t.arrow", "t.arrow"], "replay it first"),
         (&["frobnicate"], "frobnicate"),
         (&[], "Usage"),
     ];

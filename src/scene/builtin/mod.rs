@@ -47,16 +47,26 @@ fn seed(values: &Values) -> u32 {
     values.integer("seed") as u32
 }
 
-/// Builds the scene of `NAME` or `NAME:key=value,…`.
+/// The scene of `NAME` or `NAME:key=value,…` and the values of its parameters; nothing is
+/// built.
 ///
 /// # Errors
 /// [`Error::Config`] for an unknown scene or parameter.
-pub fn build(spec: &str) -> Result<Scene> {
+pub fn resolve(spec: &str) -> Result<(&'static Builtin, Values)> {
     let (name, given) = parse_spec(spec)?;
     let Some(builtin) = BUILTINS.iter().find(|b| b.name == name) else {
         return Err(Error::unknown("built-in scene", name, BUILTINS.iter().map(|b| b.name)));
     };
-    let values = Values::resolve(&format!("builtin:{name}"), builtin.params, &given)?;
+    Ok((builtin, Values::resolve(&format!("builtin:{name}"), builtin.params, &given)?))
+}
+
+/// Builds the scene of `NAME` or `NAME:key=value,…`.
+///
+/// # Errors
+/// As [`resolve`].
+pub fn build(spec: &str) -> Result<Scene> {
+    let (builtin, values) = resolve(spec)?;
+    let name = builtin.name;
     let mut scene = (builtin.build)(&values);
     let changes = values.changes(builtin.params);
     let separator = if changes.is_empty() { "" } else { ":" };

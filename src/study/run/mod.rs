@@ -1,6 +1,7 @@
 //! Measures a study, run by run. Each run's result is a file; what is there is not
 //! measured again.
 
+mod check;
 mod measure;
 mod merge;
 mod scene;
@@ -11,6 +12,7 @@ use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
+pub use check::check;
 pub use measure::SIGMAS;
 pub use merge::merge;
 pub use store::{Store, read_json};

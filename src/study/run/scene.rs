@@ -69,8 +69,7 @@ fn exact(study: &Study, trace: &Trace, samples: u32) -> Result<Picture> {
 /// Draws a scene into the trace at `path`.
 fn draw(entry: &SceneEntry, base: &Path, path: &Path) -> Result<()> {
     let source = entry.source.as_deref().unwrap_or("");
-    let located = scene::path_of(source).map(|_| base.join(source).display().to_string());
-    let mut scene = scene::load(located.as_deref().unwrap_or(source))?;
+    let mut scene = scene::load(&scene::seen_from(source, base))?;
     if let Some(texture) = &entry.texture {
         scene.apply_texture(&base.join(texture))?;
     }

@@ -33,8 +33,49 @@ const FOLDERS: [&str; 6] = ["scenes", "traces", "runs", "pictures", "explain", "
 const STUDY: &str = "study.toml";
 const MACHINES: &str = "machine.json";
 
+/// A run's record in a study's folder.
+pub(super) fn record_path(folder: &Path, id: &str) -> PathBuf {
+    folder.join("runs").join(format!("{id}.json"))
+}
+
+/// The trace of a scene that was drawn for a study's folder.
+pub(super) fn trace_path(folder: &Path, scene: &str) -> PathBuf {
+    folder.join("traces").join(format!("{scene}.arrow"))
+}
+
+fn another(folder: &Path) -> Error {
+    Error::config(
+        format_args!("{} holds another study, of which runs are measured", folder.display()),
+        "name another folder; a changed study is another one",
+    )
+}
+
+/// Whether anything has been measured in a study's folder: a run, or a publication.
+fn holds_results(folder: &Path) -> bool {
+    ["runs", "verification"].iter().any(|name| {
+        let entries = fs::read_dir(folder.join(name)).into_iter().flatten().flatten();
+        entries.into_iter().any(|e| e.path().extension().is_some_and(|ending| ending == "json"))
+    })
+}
+
+/// Removes from a study's folder what belongs to a study of which nothing was measured: scenes
+/// that were drawn, and why runs failed.
+fn clear(folder: &Path) {
+    let own = [("scenes", "json"), ("traces", "arrow"), ("runs", "failed"), ("explain", "json")];
+    for (name, ending) in own.into_iter().chain([("pictures", "exr")]) {
+        for entry in fs::read_dir(folder.join(name)).into_iter().flatten().flatten() {
+            if entry.path().extension().is_some_and(|found| found == ending) {
+                // What stays is refused where it is of another scene.
+                let _ = fs::remove_file(entry.path());
+            }
+        }
+    }
+    let _ = fs::remove_file(folder.join(STUDY));
+}
+
 impl Store {
-    /// Begins the folder of `study`, or goes on with it.
+    /// Begins the folder of `study`, or goes on with it. One that was begun for another study
+    /// of which nothing has been measured is taken over.
     ///
     /// # Errors
     /// [`Error::Config`] where the folder is another study's or something else's, or
@@ -43,14 +84,13 @@ impl Store {
         let create =
             |path: &Path| fs::create_dir_all(path).map_err(|e| Error::io("create", path, e));
         let path = folder.join(STUDY);
+        let mut taken_over = false;
         match path.try_exists() {
             Ok(true) => {
                 let there = Study::read(&path)?;
-                if there != *study {
-                    return Err(Error::config(
-                        format_args!("{} holds another study, '{}'", folder.display(), there.name),
-                        "name another folder; a changed study is another one",
-                    ));
+                taken_over = there != *study && !holds_results(folder);
+                if there != *study && !taken_over {
+                    return Err(another(folder));
                 }
             }
             Ok(false) => {
@@ -67,6 +107,13 @@ impl Store {
             Err(e) => return Err(Error::io("read", &path, e)),
         }
         let lock = lock(folder)?;
+        if taken_over {
+            // Who had the lock before may have measured something.
+            if holds_results(folder) {
+                return Err(another(folder));
+            }
+            clear(folder);
+        }
         remove_partial(folder);
         for name in FOLDERS {
             create(&folder.join(name))?;
@@ -123,7 +170,7 @@ impl Store {
 
     /// A run's record.
     pub fn record_file(&self, id: &str) -> PathBuf {
-        self.folder.join("runs").join(format!("{id}.json"))
+        record_path(&self.folder, id)
     }
 
     /// Why a run has no record.

@@ -207,33 +207,93 @@ fn a_folder_is_one_study_and_nothing_else_is_overwritten() {
 fn what_cannot_be_done_is_missing_and_the_rest_goes_on() {
     let scene = "[[scene]]\nname = 'ramps'";
     let trace = "[[scene]]\nname = 'few'\ntrace = 'few.arrow'\n[[scene]]\nname = 'ramps'";
-    let gone = "[[scene]]\nname = 'gone'\nsource = 'no.glb'\n";
-    let place = with_study(&[(scene, &format!("{gone}{trace}"))]);
-    place.good(&[
-        "capture",
-        "builtin:glass",
-        "-o",
-        "few.arrow",
-        "--size",
-        "16x16",
-        "--samples",
-        "4",
-    ]);
-    let (code, error) = place.bad(&["study", "s.toml", "-o", "out"]);
-    assert!(code == 1 && error.contains("gone.4.enderton and 7 more runs could not"), "{error}");
-    assert!(error.contains("few.8.enderton and 3 more runs"), "{error}");
-    assert_eq!(error.lines().count(), 2, "{error}");
-    let text = fs::read_to_string(place.path("out/results.jsonl")).unwrap();
-    assert_eq!(text.lines().count(), 20);
-    assert!(!text.contains("\"gone\""));
-    let page = fs::read_to_string(place.path("out/report.html")).unwrap();
-    assert!(page.contains("12 runs of the study without"));
-    assert!(page.contains("no.glb") && page.contains("cannot be replayed at 8 samples"));
-
-    // Once it can be done it is.
+    // It is there, and that it is damaged is known only when it is loaded.
+    let damaged = "[[scene]]\nname = 'damaged'\nsource = 'damaged.glb'\n";
+    let place = with_study(&[(scene, &format!("{damaged}{trace}"))]);
+    fs::write(place.path("damaged.glb"), "glTF and nothing more").unwrap();
     place.good(&["capture", "builtin:glass", "-o", "few.arrow", "--size", "16x16"]);
     let (code, error) = place.bad(&["study", "s.toml", "-o", "out"]);
+    assert!(code == 1 && error.contains("damaged.4.enderton and 7 more runs could"), "{error}");
+    assert_eq!(error.lines().count(), 1, "{error}");
+    let text = fs::read_to_string(place.path("out/results.jsonl")).unwrap();
+    assert_eq!(text.lines().count(), 24);
+    assert!(!text.contains("\"damaged\""));
+    let page = fs::read_to_string(place.path("out/report.html")).unwrap();
+    assert!(page.contains("8 runs of the study without") && page.contains("damaged.glb"));
+
+    // What is measured later must be of the same trace.
+    fs::remove_file(place.path("out/runs/few.8.lk.json")).unwrap();
+    place.good(&["capture", "builtin:glass", "-o", "few.arrow", "--size", "16x20"]);
+    let (code, error) = place.bad(&["study", "s.toml", "-o", "out"]);
     assert!(code == 1 && error.contains("was another one when the study was begun"), "{error}");
+}
+
+#[test]
+fn what_can_be_found_out_is_before_the_first_run_and_leaves_no_folder() {
+    let glass = "source = 'builtin:glass'";
+    let ramps = "source = 'builtin:ramps'";
+    let cases = [
+        (glass, "source = 'builtin:glas'", 2, "did you mean 'glass'?"),
+        (ramps, "source = 'builtin:ramps:cuont=3'", 2, "builtin:ramps"),
+        (ramps, "source = 'ramps'", 2, "did you mean 'builtin:ramps'?"),
+        (ramps, "source = 'no.glb'", 1, "no.glb: No such file"),
+        (ramps, "source = 'model.step'", 2, "do not come as '.step'"),
+        (ramps, "source = 'few.arrow'", 2, "is a trace, and a scene is asked for"),
+        (ramps, "trace = 'no.arrow'", 1, "no.arrow: No such file"),
+        (ramps, "trace = 's.toml'", 1, "s.toml"),
+        (ramps, "trace = 'few.arrow'", 2, "8 samples"),
+        (ramps, "source = 'builtin:ramps'\ntexture = 'no.png'", 1, "no.png"),
+        (ramps, "source = 'builtin:ramps'\ntexture = 's.toml'", 1, "no picture"),
+    ];
+    for (from, to, code, says) in cases {
+        let place = with_study(&[(from, to)]);
+        let few =
+            ["capture", "builtin:glass", "-o", "few.arrow", "--size", "9x9", "--samples", "4"];
+        place.good(&few);
+        let (found, error) = place.bad(&["study", "s.toml", "-o", "out"]);
+        assert!(found == code && error.contains(says), "{to}: {found}: {error}");
+        assert!(error.contains("scene '") && error.lines().count() == 1, "{error}");
+        assert!(!place.path("out").exists(), "{to}");
+    }
+    if cfg!(target_os = "linux") {
+        let place = with_study(&[("timing = 0", "timing = 0\nengines = ['fast', 'gpu']")]);
+        let output = Command::new(PROGRAM)
+            .args(["study", "s.toml", "-o", "out"])
+            .current_dir(place.path("."))
+            .env("VK_DRIVER_FILES", "/nowhere")
+            .env("VK_ICD_FILENAMES", "/nowhere")
+            .output()
+            .unwrap();
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert!(error.contains("engine 'gpu'") && error.contains("no adapter"), "{error}");
+        assert!(!output.status.success() && !place.path("out").exists());
+    }
+}
+
+#[test]
+fn a_folder_in_which_nothing_was_measured_can_be_used_again() {
+    let ramps = "source = 'builtin:ramps'";
+    let glass = "source = 'builtin:glass'";
+    let place = with_study(&[(ramps, "source = 'bad.glb'"), (glass, "source = 'bad.glb'")]);
+    fs::write(place.path("bad.glb"), "glTF and nothing more").unwrap();
+    place.bad(&["study", "s.toml", "-o", "out"]);
+    assert!(place.path("out/runs/glass.4.lk.failed").exists());
+    fs::write(place.path("s.toml"), STUDY).unwrap();
+    place.good(&["study", "s.toml", "-o", "out"]);
+    place.good(&["study", "s.toml", "-o", "new"]);
+    assert!(results(&place.path("out")) == results(&place.path("new")));
+    // With results in it it is not.
+    fs::write(place.path("s.toml"), STUDY.replace("seeds = 3", "seeds = 2")).unwrap();
+    let (code, error) = place.bad(&["study", "s.toml", "-o", "out"]);
+    assert!(code == 2 && error.contains("holds another study"), "{error}");
+    assert!(results(&place.path("out")) == results(&place.path("new")));
+}
+
+#[test]
+fn one_sample_count_needs_no_list_of_pictures() {
+    let place = with_study(&[("samples = [4, 8]", "samples = [4]"), ("pictures = [8]\n", "")]);
+    place.good(&["study", "s.toml", "-o", "out", "--shard", "1/8"]);
+    assert!(place.path("out/pictures/glass.4.enderton.exr").exists());
 }
 
 #[test]

@@ -135,7 +135,8 @@ fn numbers_below_zero_are_told_what_is_allowed() {
 #[test]
 fn lists_and_the_demo_come_as_json() {
     let place = Workplace::new();
-    let scenes: Value = serde_json::from_str(&place.good(&["scenes", "--json"])).unwrap();
+    let scenes: Value = serde_json::from_str(&place.good(&["scenes", "--json", "-"])).unwrap();
+    let scenes = &scenes["scenes"];
     let builtins = screendoor::scene::builtin::BUILTINS;
     assert_eq!(scenes.as_array().unwrap().len(), builtins.len());
     assert_eq!(scenes[0]["params"][0]["name"], builtins[0].params[0].name);
@@ -171,7 +172,8 @@ fn a_negative_square_is_explained() {
 #[cfg(unix)]
 fn a_reader_that_has_seen_enough_is_no_error() {
     let place = Workplace::with_trace();
-    for command in ["designs", "info t.arrow", "explain t.arrow --pixel 24,36", "designs --json"] {
+    for command in ["designs", "info t.arrow", "explain t.arrow --pixel 24,36", "designs --json -"]
+    {
         let (code, error) =
             shell(&place, &format!("\"$PROGRAM\" {command} | head -n 1 >/dev/null"));
         assert_eq!((code, error.as_str()), (Some(0), ""), "{command}");
