@@ -10,7 +10,9 @@ use screendoor::tile::TileId;
 use screendoor::trace::{Block, ColourFormat, ColumnId, Fragment, Header, Scalar, Trace};
 
 use crate::fast::crowd;
-use crate::util::{design, gpu, header, random_fragments, trace, variants};
+use crate::util::{
+    design, gpu, header, nearly_bare, not_bare, random_fragments, trace, variants,
+};
 
 /// What the touched tiles' pixels hold, and the picture's hash.
 type Found = (Vec<(TileId, Vec<Contents>)>, String);
@@ -149,6 +151,26 @@ fn pictures(
     assert_eq!(found.touched_tiles, expected.touched_tiles);
     assert_eq!(fragments, expected.events.unwrap().fragments);
     [found.picture, expected.picture]
+}
+
+#[test]
+fn what_nothing_covers_is_the_background_bit_for_bit_on_a_device_too() {
+    let Some(gpu) = gpu() else { return };
+    let ported = DESIGNS.iter().filter(|entry| entry.is_ported());
+    let plain = ported.map(|entry| entry.configure(&[]).unwrap());
+    let several = ["enderton:rounds=4", "lk:method=alpha-correction"].map(design);
+    for design in plain.chain(several) {
+        for samples in [1, 8, 64] {
+            // A device may take colours below 2^-126 for 0.
+            for background in [[0.1, 1.0 / 3.0, 0.7], [65504.0, 0.3, 0.0]] {
+                let trace = nearly_bare(samples, background);
+                let options = GpuOptions::default();
+                let [found, _] = pictures(gpu, &design, &trace, samples, &options);
+                let wrong = not_bare(&found, background);
+                assert!(wrong.is_empty(), "{} at {samples}: {wrong:?}", design.label());
+            }
+        }
+    }
 }
 
 /// Channels that differ by more than is allowed, and how many there are.

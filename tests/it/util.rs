@@ -148,10 +148,10 @@ pub fn layered(
 /// ends of what a trace can hold.
 pub const AWKWARD: [f32; 5] = [0.1, 1.0 / 3.0, 0.7, 1e-38, 65504.0];
 
-/// Two tiles over a background: in the first one a transparent fragment that covers a
-/// part of a pixel and an opaque one elsewhere, in the second nothing.
+/// Three tiles over a background: in the first one a transparent fragment that covers a
+/// part of a pixel and an opaque one elsewhere, in the others nothing.
 pub fn nearly_bare(samples: u32, background: [f32; 3]) -> Trace {
-    let header = Header { background, colour: ColourFormat::F32, ..header(16, 8, samples) };
+    let header = Header { background, colour: ColourFormat::F32, ..header(48, 8, samples) };
     let fragment = |x: u16, alpha: f32| Fragment {
         x,
         y: 2,
