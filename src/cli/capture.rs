@@ -238,7 +238,7 @@ fn into_file(
     drop(progress);
     let (file, written) = writer.finish()?;
     file.commit()?;
-    on_interrupt(format_args!("{place} is whole and kept"));
+    on_interrupt(move || format!("{place} is whole and kept"));
     if written.rows == 0 {
         console.warn(&format!("the trace has no fragments: {}", why_empty(header)));
     }

@@ -133,7 +133,9 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         about(minutes(effort, arguments.part, threads)),
         path.display()
     ));
-    on_interrupt("nothing was written: what had been measured is lost; --part measures a part");
+    on_interrupt(|| {
+        "nothing was written, and what was measured is lost; --part measures a part".to_string()
+    });
     let progress = console.progress("reproducing", "steps");
     let models = arguments.models.as_deref();
     let mut documents: Vec<(Publication, Document)> = Vec::new();

@@ -1,26 +1,27 @@
 //! What happens when the user or the system ends the program early.
 
-use std::fmt::Display;
 #[cfg(unix)]
 use std::io::{self, IsTerminal as _, Write as _};
 #[cfg(unix)]
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// What an interrupted command has kept.
-static KEPT: Mutex<Option<String>> = Mutex::new(None);
+type Say = Box<dyn Fn() -> String + Send>;
 
-/// Has the program say `text` when it is interrupted. Where no command has said so, nothing
-/// was written.
-pub(super) fn on_interrupt(text: impl Display) {
-    *KEPT.lock().unwrap_or_else(PoisonError::into_inner) = Some(text.to_string());
+/// Says what an interrupted command has kept.
+static KEPT: Mutex<Option<Say>> = Mutex::new(None);
+
+/// Has the program say what `kept` gives when it is interrupted. Where no command has said
+/// so, nothing was written.
+pub(super) fn on_interrupt(kept: impl Fn() -> String + Send + 'static) {
+    *KEPT.lock().unwrap_or_else(PoisonError::into_inner) = Some(Box::new(kept));
 }
 
 /// What is said of the end.
 #[cfg(unix)]
 fn kept() -> String {
     let kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner).take();
-    kept.unwrap_or_else(|| "nothing was written".to_string())
+    kept.map_or_else(|| "nothing was written".to_string(), |say| say())
 }
 
 /// Has Ctrl-C, termination and hang-up remove files under construction before

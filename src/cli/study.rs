@@ -18,7 +18,7 @@ use crate::report::{About, PAGE, document, write_report};
 use crate::study::file::Study;
 use crate::study::publications::{Effort, measure_publication};
 use crate::study::results::{Missing, Results};
-use crate::study::run::{Runner, Shard, Store, check, merge};
+use crate::study::run::{Runner, Shard, Store, Task, check, merge};
 
 /// Measure a study: what its file says, run by run, into a folder with a report; called
 /// again it goes on where it was interrupted
@@ -121,13 +121,19 @@ pub(super) fn measured(
         shard: place.shard,
         adapter: place.adapter,
         watch: &|what, done, total| {
-            on_interrupt(format_args!(
-                "{done} of {total} runs are kept; the same command goes on with the others"
-            ));
             progress.name(what);
             progress.set(done, total);
         },
     };
+    let done = |task: &Task| match task {
+        Task::Run(job) => store.record_file(&job.id),
+        Task::Publication(publication) => store.document_file(*publication),
+    };
+    let files: Vec<PathBuf> = runner.tasks().iter().map(done).collect();
+    on_interrupt(move || {
+        let (kept, all) = (files.iter().filter(|file| file.exists()).count(), files.len());
+        format!("{kept} of {all} runs are kept; the same command goes on with the others")
+    });
     let outcome = runner.run()?;
     let unpublished = publications(&runner)?;
     drop(progress);

@@ -10,9 +10,7 @@ use screendoor::tile::TileId;
 use screendoor::trace::{Block, ColourFormat, ColumnId, Fragment, Header, Scalar, Trace};
 
 use crate::fast::crowd;
-use crate::util::{
-    design, gpu, header, nearly_bare, not_bare, random_fragments, trace, variants,
-};
+use crate::util::{design, gpu, header, nearly_bare, not_bare, random_fragments, trace, variants};
 
 /// What the touched tiles' pixels hold, and the picture's hash.
 type Found = (Vec<(TileId, Vec<Contents>)>, String);
