@@ -7,7 +7,7 @@ use clap::Args;
 use crate::cli::console::{Console, grouped, shown};
 use crate::cli::files::check;
 use crate::error::Result;
-use crate::trace::{Coverage, Trace};
+use crate::trace::{Checksums, Trace};
 
 /// Check traces: schema, checksums, values and content hash
 #[derive(Debug, Args)]
@@ -39,11 +39,11 @@ fn verify(path: &Path, console: &Console) -> Result<String> {
         progress.set(done, trace.rows());
     })?;
     let seal = match trace.checksums() {
-        Coverage::All => "checksums of every byte and content hash hold",
-        Coverage::Batches => {
+        Checksums::All => "checksums of every byte and content hash hold",
+        Checksums::Batches => {
             "checksums and content hash hold; of an older seal, which leaves parts of the footer open"
         }
-        Coverage::None => "well formed; it carries no checksums to hold it against",
+        Checksums::None => "well formed; it carries no checksums to hold it against",
     };
     let (place, fragments) = (shown(trace.place()), grouped(trace.rows()));
     Ok(format!("{place}: {fragments} fragments, content {hash}: {seal}"))

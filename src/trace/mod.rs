@@ -31,6 +31,6 @@ pub(crate) use block::{STRETCH, Stretch};
 pub use column::{ChannelColumn, Column, ColumnId, CoverageColumn, Native, Scalar, ValueType};
 pub use fragment::{DepthPlane, Fragment, MAX_SAMPLES, SampleMask, Unorm32};
 pub use header::{ColourFormat, FORMAT_VERSION, Header, MAX_SIDE, SamplePattern};
-pub use read::{Coverage, Trace};
+pub use read::{Checksums, Trace};
 pub use stats::{AlphaStatistics, Distribution, Objects, Statistics, statistics};
 pub use write::{Compression, TraceWriter, WriteOptions, Written};

@@ -50,7 +50,7 @@ struct Inner {
 
 /// What a trace's checksums cover.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Coverage {
+pub enum Checksums {
     /// There are none: another program wrote it.
     None,
     /// The head and every batch, and what the footer says of them; not all of the
@@ -227,11 +227,11 @@ impl Trace {
     }
 
     /// What its checksums cover.
-    pub fn checksums(&self) -> Coverage {
+    pub fn checksums(&self) -> Checksums {
         match &self.inner.seal {
-            None => Coverage::None,
-            Some(Seal { tail: None, .. }) => Coverage::Batches,
-            Some(Seal { tail: Some(_), .. }) => Coverage::All,
+            None => Checksums::None,
+            Some(Seal { tail: None, .. }) => Checksums::Batches,
+            Some(Seal { tail: Some(_), .. }) => Checksums::All,
         }
     }
 
@@ -244,9 +244,9 @@ impl Trace {
     /// the file, the type read.
     pub fn converted_columns(&self) -> impl Iterator<Item = (&'static str, String, ValueType)> {
         let pairs = self.inner.stored.list.iter().zip(&self.inner.columns);
-        pairs.filter(|(column, (_, read))| !column.is(*read)).map(|(column, (id, read))| {
-            (id.name(), column.stored.to_string(), *read)
-        })
+        pairs
+            .filter(|(column, (_, read))| !column.is(*read))
+            .map(|(column, (id, read))| (id.name(), column.stored.to_string(), *read))
     }
 
     /// The content hash that it was written with; `None` where it is not sealed.

@@ -160,11 +160,7 @@ impl StoredColumns {
     /// Holds the columns against the header: each is stored with a type that can be read,
     /// or is constant, and not both. Tells as which type each is read, and the header of
     /// which precision colours are.
-    pub fn complete(
-        &self,
-        header: &mut Header,
-        place: &str,
-    ) -> Result<Vec<(ColumnId, ValueType)>> {
+    pub fn complete(&self, header: &mut Header, place: &str) -> Result<Vec<(ColumnId, ValueType)>> {
         let samples = header.pattern.samples();
         for id in ColumnId::ALL {
             let stored = self.list.iter().any(|column| column.id == id);
@@ -201,7 +197,13 @@ impl StoredColumn {
 
     /// The column's `rows` values as `to`, which it can be read as; `values` are the
     /// bytes of at least as many. Without a copy where they are of that type.
-    pub fn convert(&self, to: ValueType, values: Buffer, rows: usize, place: &str) -> Result<Buffer> {
+    pub fn convert(
+        &self,
+        to: ValueType,
+        values: Buffer,
+        rows: usize,
+        place: &str,
+    ) -> Result<Buffer> {
         if self.is(to) {
             return Ok(values);
         }
@@ -290,9 +292,11 @@ impl Shape {
             // Their buffers depend on the format's version.
             _ => return Err(refuse(&format!("is of type {}", type_name(field)))),
         };
-        field.children().iter().flatten().try_for_each(|child| {
-            self.add(child, name, place, depth + 1)
-        })
+        field
+            .children()
+            .iter()
+            .flatten()
+            .try_for_each(|child| self.add(child, name, place, depth + 1))
     }
 
     /// Where a column's own arrays and buffers begin in a batch whose views have so many

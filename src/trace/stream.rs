@@ -37,10 +37,8 @@ pub(crate) fn parse(file: &[u8], place: &str) -> Result<Layout> {
         }
         let body_bytes = usize::try_from(message.bodyLength()).map_err(|_| cut())?;
         let block = Block { offset: end as u64, message_bytes: message_end - end, body_bytes };
-        end = message_end
-            .checked_add(body_bytes)
-            .filter(|end| *end <= file.len())
-            .ok_or_else(cut)?;
+        end =
+            message_end.checked_add(body_bytes).filter(|end| *end <= file.len()).ok_or_else(cut)?;
         blocks.push(block);
     }
     if end + 8 != file.len() {

@@ -10,10 +10,10 @@ use arrow_schema::{ArrowError, SchemaRef};
 use crate::error::{Error, Result};
 use crate::output::OutputFile;
 use crate::trace::batch::{BatchBuilder, MAX_BATCH_ROWS, schema};
+use crate::trace::column::ColumnId;
 use crate::trace::content::ContentHasher;
 use crate::trace::fragment::Fragment;
 use crate::trace::header::Header;
-use crate::trace::column::ColumnId;
 use crate::trace::seal::{CHECKSUMS, CHECKSUMS_KIND, SealingWriter};
 
 crate::options! {
