@@ -70,6 +70,12 @@ fn print(trace: &Trace, stats: &Statistics, console: &Console) -> Result<()> {
     for (column, value) in &header.constants {
         line("  constant", format!("{} = {value}", column.name()))?;
     }
+    for (column, stored, read) in trace.converted_columns() {
+        line("  read", format!("{column}: {read} from {stored}"))?;
+    }
+    for (column, stored) in trace.extra_columns() {
+        line("  passed over", format!("{column}: {stored}"))?;
+    }
     if let Some(content) = trace.content() {
         line("content", content.to_string())?;
     }

@@ -9,7 +9,7 @@ use crate::cli::console::{Console, grouped, shown};
 use crate::cli::files::{JsonArgument, check, report};
 use crate::cli::kind::{Kind, check_input};
 use crate::error::Result;
-use crate::trace::Trace;
+use crate::trace::{Checksums, Trace};
 
 /// Check traces: schema, checksums, values and content hash
 #[derive(Debug, Args)]
@@ -37,7 +37,7 @@ struct Checked {
 #[derive(Serialize)]
 #[serde(untagged)]
 enum Found {
-    Good { fragments: u64, content: String, sealed: bool },
+    Good { fragments: u64, content: String, checksums: Checksums },
     Bad { error: String },
 }
 
@@ -68,11 +68,13 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
 }
 
 fn print(checked: &Checked, console: &Console) -> Result<()> {
-    let Found::Good { fragments, content, sealed } = &checked.found else { return Ok(()) };
-    let seal = if *sealed {
-        "checksums and content hash hold"
-    } else {
-        "well formed; it carries no checksums to hold it against"
+    let Found::Good { fragments, content, checksums } = &checked.found else { return Ok(()) };
+    let seal = match checksums {
+        Checksums::All => "checksums of every byte and content hash hold",
+        Checksums::Batches => {
+            "checksums and content hash hold; of an older seal, which leaves parts of the footer open"
+        }
+        Checksums::None => "well formed; it carries no checksums to hold it against",
     };
     let (place, fragments) = (shown(&checked.trace), grouped(*fragments));
     console.print(format_args!("{place}: {fragments} fragments, content {content}: {seal}"))
@@ -89,5 +91,5 @@ fn verify(path: &Path, console: &Console) -> Result<Found> {
         done += rows;
         progress.set(done, trace.rows());
     })?;
-    Ok(Found::Good { fragments: trace.rows(), content, sealed: trace.is_sealed() })
+    Ok(Found::Good { fragments: trace.rows(), content, checksums: trace.checksums() })
 }

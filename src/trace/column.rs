@@ -106,7 +106,7 @@ pub enum ValueType {
 }
 
 impl ValueType {
-    const ALL: [ValueType; 7] = {
+    pub(crate) const ALL: [ValueType; 7] = {
         use ValueType::*;
         [U8, U16, U32, U64, I32, F16, F32]
     };

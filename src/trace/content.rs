@@ -1,13 +1,14 @@
 //! The content hash: what a trace says, however it is stored.
 
-use crate::trace::batch::Batch;
-use crate::trace::column::ColumnId;
-use crate::trace::header::Header;
+use std::collections::BTreeMap;
 
-/// Hashes a trace's content as its batches pass: BLAKE3 over the header's
-/// entries and over the BLAKE3 of each stored column's little-endian bytes. The
-/// same fragments give the same hash in batches of any size and under any
-/// compression.
+use crate::trace::column::ColumnId;
+use crate::trace::seal::CHECKSUMS;
+
+/// Hashes a trace's content as its batches pass: BLAKE3 over the entries of the
+/// schema's metadata, as they are spelt in the file, and over the BLAKE3 of each
+/// stored column's little-endian bytes. The same fragments give the same hash in
+/// batches of any size and under any compression.
 #[derive(Debug)]
 pub(crate) struct ContentHasher {
     header: blake3::Hasher,
@@ -15,25 +16,25 @@ pub(crate) struct ContentHasher {
 }
 
 impl ContentHasher {
-    pub fn new(header: &Header) -> Self {
+    /// A hasher for a file with this metadata of the schema and these columns, in the
+    /// file's order.
+    pub fn new(
+        metadata: &BTreeMap<String, String>,
+        columns: impl Iterator<Item = ColumnId>,
+    ) -> Self {
         let mut entries = blake3::Hasher::new();
-        for (key, value) in header.to_metadata() {
+        // Whether a file is sealed is not part of what it says.
+        for (key, value) in metadata.iter().filter(|(key, _)| *key != CHECKSUMS) {
             entries.update(format!("{key}={value}\n").as_bytes());
         }
-        let columns = ColumnId::ALL
-            .into_iter()
-            .filter(|id| !header.constants.contains_key(id))
-            .map(|id| (id, blake3::Hasher::new()))
-            .collect();
+        let columns = columns.map(|id| (id, blake3::Hasher::new())).collect();
         ContentHasher { header: entries, columns }
     }
 
-    pub fn update(&mut self, batch: &Batch) {
-        let buffers = batch.buffers();
-        for (id, hasher) in &mut self.columns {
-            if let Some((value_type, bytes)) = buffers[*id as usize].1 {
-                hasher.update(&bytes.as_slice()[..batch.len() * value_type.bytes()]);
-            }
+    /// Adds the next values of `column`, as they are stored.
+    pub fn update(&mut self, column: ColumnId, values: &[u8]) {
+        if let Some((_, hasher)) = self.columns.iter_mut().find(|(id, _)| *id == column) {
+            hasher.update(values);
         }
     }
 

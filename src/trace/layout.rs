@@ -12,18 +12,20 @@ use std::ops::Range;
 
 use arrow_buffer::Buffer;
 use arrow_ipc::{
-    CompressionType, Endianness, KeyValue, MetadataVersion, Precision, Type, root_as_footer,
-    root_as_message,
+    CompressionType, Endianness, KeyValue, MetadataVersion, root_as_footer, root_as_message,
 };
 
 use crate::error::{Error, Result};
 use crate::trace::batch::MAX_BATCH_ROWS;
-use crate::trace::column::{ColumnId, ValueType};
+use crate::trace::column::ColumnId;
 use crate::trace::decompress::decompress;
+use crate::trace::other::refuse_other_formats;
 use crate::trace::seal::damaged;
+use crate::trace::stored::{Shape, StoredColumn, StoredColumns};
+use crate::trace::stream;
 
 const MAGIC: &[u8; 6] = b"ARROW1";
-const CONTINUATION: [u8; 4] = [0xff; 4];
+pub(crate) const CONTINUATION: [u8; 4] = [0xff; 4];
 /// The magic at the end and the footer's length before it.
 const TAIL_BYTES: usize = MAGIC.len() + 4;
 /// Writers pad the head to at most this alignment.
@@ -34,14 +36,14 @@ const MAX_ALIGNMENT: usize = 64;
 pub(crate) struct Layout {
     /// The schema's metadata.
     pub metadata: BTreeMap<String, String>,
-    /// The columns that are stored, in file order.
-    pub columns: Vec<(ColumnId, ValueType)>,
+    /// The columns that are stored.
+    pub columns: StoredColumns,
     /// Where the first record batch begins.
     pub head_end: u64,
     /// The record batches: contiguous from `head_end`.
     pub blocks: Vec<Block>,
-    /// The footer's own metadata.
-    pub footer_metadata: BTreeMap<String, String>,
+    /// The footer's own metadata; `None` for a stream, which has no footer.
+    pub footer_metadata: Option<BTreeMap<String, String>>,
 }
 
 /// Where one record batch lies in the file.
@@ -62,34 +64,34 @@ impl Block {
     }
 }
 
-fn not_a_trace(place: &str, what: impl std::fmt::Display) -> Error {
+pub(crate) fn not_a_trace(place: &str, what: impl std::fmt::Display) -> Error {
     Error::invalid(place, what, "give a trace written by 'screendoor capture'")
 }
 
 impl Layout {
     /// Reads the layout of the file whose bytes are `file`.
     pub fn parse(file: &[u8], place: &str) -> Result<Self> {
-        if file.len() < MAGIC.len() || &file[..MAGIC.len()] != MAGIC {
+        if file.starts_with(&CONTINUATION) {
+            return stream::parse(file, place);
+        }
+        if !file.starts_with(MAGIC) {
+            refuse_other_formats(file, place)?;
             return Err(not_a_trace(place, "it is not an Arrow IPC file"));
         }
         if file.len() < 2 * MAX_ALIGNMENT || &file[file.len() - MAGIC.len()..] != MAGIC {
             return Err(damaged(place, "its end is missing (truncated)"));
         }
-        let tail = file.len() - TAIL_BYTES;
-        let footer_bytes = read_i32(file, tail);
-        let footer_start = usize::try_from(footer_bytes)
-            .ok()
-            .and_then(|n| tail.checked_sub(n))
-            .filter(|start| *start >= MAGIC.len())
+        let Range { start: footer_start, end: footer_end } = footer_range(file)
+            .filter(|range| range.start >= MAGIC.len())
             .ok_or_else(|| damaged(place, "its footer's length does not fit the file"))?;
-        let footer = root_as_footer(&file[footer_start..tail])
+        let footer = root_as_footer(&file[footer_start..footer_end])
             .map_err(|e| damaged(place, format_args!("its footer cannot be read ({e})")))?;
         check_version(footer.version(), place)?;
+        let schema = footer.schema().ok_or_else(|| damaged(place, "its footer has no schema"))?;
+        let (metadata, columns) = read_schema(schema, place)?;
         if footer.dictionaries().is_some_and(|d| !d.is_empty()) {
             return Err(not_a_trace(place, "it has dictionary-encoded columns"));
         }
-        let schema = footer.schema().ok_or_else(|| damaged(place, "its footer has no schema"))?;
-        let (metadata, columns) = read_schema(schema, place)?;
 
         let (head, head_end) = read_head(file, footer_start, place)?;
         if read_schema(head, place)? != (metadata.clone(), columns.clone()) {
@@ -128,9 +130,21 @@ impl Layout {
         if !(rest.is_empty() || rest == [0; 4] || rest == marker) {
             return Err(damaged(place, "there are stray bytes after its last batch"));
         }
-        let footer_metadata = key_values(footer.custom_metadata().iter().flatten(), place)?;
+        let footer_metadata = Some(key_values(footer.custom_metadata().iter().flatten(), place)?);
         Ok(Layout { metadata, columns, head_end: head_end as u64, blocks, footer_metadata })
     }
+
+    /// Where the last batch ends, or the head where there is none.
+    pub fn blocks_end(&self) -> u64 {
+        self.blocks.last().map_or(self.head_end, Block::end)
+    }
+}
+
+/// Where the footer lies in a file, or in its end.
+pub(crate) fn footer_range(end: &[u8]) -> Option<Range<usize>> {
+    let footer_end = end.len().checked_sub(TAIL_BYTES)?;
+    let length = usize::try_from(read_i32(end, footer_end)).ok()?;
+    Some(footer_end.checked_sub(length)?..footer_end)
 }
 
 /// The schema message at the file's head and the offset at which it ends.
@@ -153,7 +167,7 @@ fn read_head<'a>(
 }
 
 /// The flatbuffer of the encapsulated message at `start` and where it ends.
-fn read_message(file: &[u8], start: usize, limit: usize) -> Option<(&[u8], usize)> {
+pub(crate) fn read_message(file: &[u8], start: usize, limit: usize) -> Option<(&[u8], usize)> {
     if start + 8 > limit || file[start..start + 4] != CONTINUATION {
         return None;
     }
@@ -166,7 +180,7 @@ fn read_i32(bytes: &[u8], at: usize) -> i32 {
     i32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"))
 }
 
-fn check_version(version: MetadataVersion, place: &str) -> Result<()> {
+pub(crate) fn check_version(version: MetadataVersion, place: &str) -> Result<()> {
     if version == MetadataVersion::V5 || version == MetadataVersion::V4 {
         return Ok(());
     }
@@ -177,52 +191,15 @@ fn check_version(version: MetadataVersion, place: &str) -> Result<()> {
     ))
 }
 
-type Schema = (BTreeMap<String, String>, Vec<(ColumnId, ValueType)>);
+type Schema = (BTreeMap<String, String>, StoredColumns);
 
-fn read_schema(schema: arrow_ipc::Schema<'_>, place: &str) -> Result<Schema> {
+pub(crate) fn read_schema(schema: arrow_ipc::Schema<'_>, place: &str) -> Result<Schema> {
     if schema.endianness() != Endianness::Little {
         return Err(Error::unsupported(place, "it is big-endian", "write it little-endian"));
     }
     let metadata = key_values(schema.custom_metadata().iter().flatten(), place)?;
-    let mut columns: Vec<(ColumnId, ValueType)> = Vec::new();
-    for field in schema.fields().iter().flatten() {
-        let name = field.name().unwrap_or("");
-        let Some(id) = ColumnId::ALL.into_iter().find(|id| id.name() == name) else {
-            return Err(not_a_trace(place, format_args!("'{name}' is no column of a trace")));
-        };
-        if columns.last().is_some_and(|(last, _)| *last >= id) {
-            let what = format_args!("the column '{name}' stands out of order or twice").to_string();
-            return Err(not_a_trace(place, what));
-        }
-        let value_type =
-            value_type(field).filter(|_| field.dictionary().is_none()).ok_or_else(|| {
-                not_a_trace(place, format_args!("column '{name}' has a type that no trace has"))
-            })?;
-        columns.push((id, value_type));
-    }
+    let columns = StoredColumns::of(schema.fields().iter().flatten(), place)?;
     Ok((metadata, columns))
-}
-
-fn value_type(field: arrow_ipc::Field<'_>) -> Option<ValueType> {
-    match field.type_type() {
-        Type::Int => {
-            let int = field.type_as_int()?;
-            Some(match (int.is_signed(), int.bitWidth()) {
-                (false, 8) => ValueType::U8,
-                (false, 16) => ValueType::U16,
-                (false, 32) => ValueType::U32,
-                (false, 64) => ValueType::U64,
-                (true, 32) => ValueType::I32,
-                _ => return None,
-            })
-        }
-        Type::FloatingPoint => match field.type_as_floating_point()?.precision() {
-            Precision::HALF => Some(ValueType::F16),
-            Precision::SINGLE => Some(ValueType::F32),
-            _ => None,
-        },
-        _ => None,
-    }
 }
 
 fn key_values<'a>(
@@ -245,7 +222,7 @@ fn key_values<'a>(
 #[derive(Debug)]
 pub(crate) struct BatchLayout {
     pub rows: usize,
-    columns: Vec<(ColumnId, ValueType, Range<usize>)>,
+    columns: Vec<(StoredColumn, Range<usize>)>,
     compression: Option<CompressionType>,
 }
 
@@ -255,7 +232,7 @@ impl BatchLayout {
     pub fn parse(
         bytes: &[u8],
         block: &Block,
-        columns: &[(ColumnId, ValueType)],
+        columns: &StoredColumns,
         place: &str,
     ) -> Result<Self> {
         let bad = |what: &str| damaged(place, what);
@@ -284,11 +261,22 @@ impl BatchLayout {
         let compression = batch.compression().map(|c| c.codec());
         let nodes: Vec<_> = batch.nodes().iter().flatten().collect();
         let buffers: Vec<_> = batch.buffers().iter().flatten().collect();
-        if nodes.len() != columns.len() || buffers.len() != 2 * columns.len() {
+        let views: Vec<usize> = batch
+            .variadicBufferCounts()
+            .iter()
+            .flatten()
+            .map(|count| usize::try_from(count).unwrap_or(usize::MAX))
+            .collect();
+        let all = &columns.all;
+        if nodes.len() != all.nodes
+            || views.len() != all.views
+            || all.buffer(&views) != Some(buffers.len())
+        {
             return Err(bad("it does not have the file's columns"));
         }
-        let mut found = Vec::with_capacity(columns.len());
-        for (i, (id, value_type)) in columns.iter().enumerate() {
+        let mut found = Vec::with_capacity(columns.list.len());
+        for column in &columns.list {
+            let StoredColumn { id, stored, place: Shape { nodes: i, .. } } = *column;
             let name = id.name();
             let bad = |what: &str| bad(&format!("its column '{name}' {what}"));
             if usize::try_from(nodes[i].length()).ok() != Some(rows) {
@@ -297,17 +285,19 @@ impl BatchLayout {
             if nodes[i].null_count() != 0 {
                 return Err(bad("has nulls"));
             }
-            let buffer = buffers[2 * i + 1];
+            // Validity first; no array of a column of ours has other buffers.
+            let first = column.place.buffer(&views).expect("no more than all have");
+            let buffer = buffers[first + 1];
             let range = usize::try_from(buffer.offset())
                 .ok()
                 .zip(usize::try_from(buffer.length()).ok())
                 .and_then(|(start, n)| Some(start..start.checked_add(n)?))
                 .filter(|range| range.end <= block.body_bytes)
                 .ok_or_else(|| bad("lies outside the batch"))?;
-            if compression.is_none() && range.len() < rows * value_type.bytes() {
+            if compression.is_none() && range.len() < rows * stored.bytes() {
                 return Err(bad("is too short"));
             }
-            found.push((*id, *value_type, range));
+            found.push((*column, range));
         }
         Ok(BatchLayout { rows, columns: found, compression })
     }
@@ -320,16 +310,16 @@ impl BatchLayout {
         block: &Buffer,
         message_bytes: usize,
         place: &str,
-    ) -> Result<Option<(ValueType, Buffer)>> {
-        let Some((_, value_type, range)) = self.columns.iter().find(|c| c.0 == column) else {
+    ) -> Result<Option<(StoredColumn, Buffer)>> {
+        let Some((found, range)) = self.columns.iter().find(|(c, _)| c.id == column) else {
             return Ok(None);
         };
         let stored = block.slice_with_length(message_bytes + range.start, range.len());
-        let wanted = self.rows * value_type.bytes();
+        let wanted = self.rows * found.stored.bytes();
         let bad =
             |what: &str| damaged(place, format_args!("its column '{}' {what}", column.name()));
         let Some(codec) = self.compression.filter(|_| wanted > 0) else {
-            return Ok(Some((*value_type, stored)));
+            return Ok(Some((*found, stored)));
         };
         // A compressed buffer begins with its decompressed length, −1 for a buffer
         // that is stored as it is.
@@ -351,6 +341,6 @@ impl BatchLayout {
         if values.len() < wanted {
             return Err(bad("is too short"));
         }
-        Ok(Some((*value_type, values)))
+        Ok(Some((*found, values)))
     }
 }

@@ -1,5 +1,6 @@
 //! Reading a trace, batch by batch.
 
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -8,14 +9,16 @@ use std::sync::Arc;
 use arrow_buffer::Buffer;
 use bytes::Bytes;
 use memmap2::MmapOptions;
+use serde::Serialize;
 
 use crate::error::{Error, Result};
 use crate::trace::batch::{Batch, Source};
 use crate::trace::column::{ColumnId, ValueType};
 use crate::trace::content::ContentHasher;
-use crate::trace::header::{ColourFormat, Header};
+use crate::trace::header::Header;
 use crate::trace::layout::{BatchLayout, Block, Layout};
 use crate::trace::seal::{CHECKSUMS, CHECKSUMS_KIND, Seal, damaged};
+use crate::trace::stored::StoredColumns;
 
 /// A trace that is open for reading. Cloning shares it.
 ///
@@ -34,11 +37,29 @@ struct Inner {
     place: String,
     storage: Storage,
     header: Header,
+    /// The schema's metadata as it is spelt in the file.
+    metadata: BTreeMap<String, String>,
+    /// How the columns are stored.
+    stored: StoredColumns,
+    /// As what they are read.
     columns: Vec<(ColumnId, ValueType)>,
     blocks: Vec<Block>,
     block_rows: Vec<u64>,
     rows: u64,
     seal: Option<Seal>,
+}
+
+/// What a trace's checksums cover.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Checksums {
+    /// There are none: another program wrote it.
+    None,
+    /// The head and every batch, and what the footer says of them; not all of the
+    /// footer's bytes. Seals were so before `screendoor.tail`.
+    Batches,
+    /// Every byte of the file.
+    All,
 }
 
 #[derive(Debug)]
@@ -115,11 +136,22 @@ impl Trace {
         };
         let layout = Layout::parse(&file, &place)?;
         let mut header = Header::from_metadata(&layout.metadata, &place)?;
-        complete(&mut header, &layout, &place)?;
+        let columns = layout.columns.complete(&mut header, &place)?;
 
         let seal = match layout.metadata.get(CHECKSUMS).map(String::as_str) {
             Some(CHECKSUMS_KIND) => {
-                let seal = Seal::from_metadata(&layout.footer_metadata, &place)?;
+                let entries = layout.footer_metadata.as_ref().filter(|map| Seal::is_in(map));
+                let Some(entries) = entries else {
+                    return Err(Error::invalid(
+                        &place,
+                        "it is damaged: it says that it is sealed and has no seal",
+                        format_args!(
+                            "restore a copy; where another program wrote it anew on purpose, \
+                             let it leave the metadata '{CHECKSUMS}' out"
+                        ),
+                    ));
+                };
+                let seal = Seal::from_metadata(entries, &place)?;
                 let ends =
                     std::iter::once(layout.head_end).chain(layout.blocks.iter().map(Block::end));
                 if !ends.eq(seal.blocks.iter().map(|b| b.end)) {
@@ -127,6 +159,7 @@ impl Trace {
                 }
                 let head = &file[..layout.head_end as usize];
                 check_crc(head, seal.blocks[0].crc, &format!("{place}, head"))?;
+                seal.check_tail(&file[layout.blocks_end() as usize..], &place)?;
                 Some(seal)
             }
             Some(other) => {
@@ -158,7 +191,9 @@ impl Trace {
             place,
             storage,
             header,
-            columns: layout.columns,
+            metadata: layout.metadata,
+            stored: layout.columns,
+            columns,
             blocks: layout.blocks,
             block_rows,
             rows,
@@ -177,7 +212,8 @@ impl Trace {
         &self.inner.place
     }
 
-    /// The columns that are stored, in the file's order; the others are constant.
+    /// The columns that are stored, in the file's order, and the types as which they are
+    /// read; the others are constant.
     pub(crate) fn columns(&self) -> &[(ColumnId, ValueType)] {
         &self.inner.columns
     }
@@ -192,12 +228,35 @@ impl Trace {
         self.inner.seal.is_some()
     }
 
+    /// What its checksums cover.
+    pub fn checksums(&self) -> Checksums {
+        match &self.inner.seal {
+            None => Checksums::None,
+            Some(Seal { tail: None, .. }) => Checksums::Batches,
+            Some(Seal { tail: Some(_), .. }) => Checksums::All,
+        }
+    }
+
+    /// Name and type of the columns that no trace has: they are passed over.
+    pub fn extra_columns(&self) -> &[(String, String)] {
+        &self.inner.stored.extra
+    }
+
+    /// The columns that are stored in another type than they are read as: name, the type in
+    /// the file, the type read.
+    pub fn converted_columns(&self) -> impl Iterator<Item = (&'static str, String, ValueType)> {
+        let pairs = self.inner.stored.list.iter().zip(&self.inner.columns);
+        pairs
+            .filter(|(column, (_, read))| !column.is(*read))
+            .map(|(column, (id, read))| (id.name(), column.stored.to_string(), *read))
+    }
+
     /// The content hash that it was written with; `None` where it is not sealed.
     pub fn content(&self) -> Option<&str> {
         self.inner.seal.as_ref().map(|s| s.content.as_str())
     }
 
-    /// Bytes of a fragment's stored columns, before compression.
+    /// Bytes of a fragment's stored columns, before compression, as they are read.
     pub fn bytes_per_row(&self) -> u64 {
         self.columns().iter().map(|(_, value_type)| value_type.bytes() as u64).sum()
     }
@@ -224,6 +283,12 @@ impl Trace {
     /// # Panics
     /// Where `i` is not below [`Trace::batch_count`].
     pub fn batch(&self, i: usize) -> Result<Batch> {
+        self.read_batch(i, |_, _| ())
+    }
+
+    /// As [`Trace::batch`]; `stored` is told each stored column's bytes, as they are in the
+    /// file once decompressed.
+    fn read_batch(&self, i: usize, mut stored: impl FnMut(ColumnId, &[u8])) -> Result<Batch> {
         let inner = &*self.inner;
         let block = &inner.blocks[i];
         let place = batch_place(&inner.place, i, block);
@@ -231,14 +296,20 @@ impl Trace {
         if let Some(seal) = &inner.seal {
             check_crc(&bytes, seal.blocks[i + 1].crc, &place)?;
         }
-        let layout = BatchLayout::parse(&bytes, block, &inner.columns, &place)?;
+        let layout = BatchLayout::parse(&bytes, block, &inner.stored, &place)?;
         if layout.rows as u64 != inner.block_rows[i] {
             return Err(damaged(&place, "its row count differs from the seal's"));
         }
         let bytes = Buffer::from(bytes);
         let batch = Batch::assemble(layout.rows, |id| {
-            Ok(match layout.values(id, &bytes, block.message_bytes, &place)? {
-                Some((value_type, values)) => Source::Bytes(value_type, values),
+            let values = layout.values(id, &bytes, block.message_bytes, &place)?;
+            let read = inner.columns.iter().find(|(column, _)| *column == id);
+            Ok(match values.zip(read) {
+                Some(((column, values), (_, value_type))) => {
+                    stored(id, &values[..layout.rows * column.stored.bytes()]);
+                    let values = column.convert(*value_type, values, layout.rows, &place)?;
+                    Source::Bytes(*value_type, values)
+                }
                 None => Source::Constant(inner.header.constants[&id]),
             })
         })?;
@@ -257,10 +328,10 @@ impl Trace {
     /// # Errors
     /// As [`Trace::batch`]; [`Error::Invalid`] where the hashes differ.
     pub fn verify(&self, mut progress: impl FnMut(u64)) -> Result<String> {
-        let mut hasher = ContentHasher::new(self.header());
-        for batch in self.batches() {
-            let batch = batch?;
-            hasher.update(&batch);
+        let columns = self.inner.columns.iter().map(|(id, _)| *id);
+        let mut hasher = ContentHasher::new(&self.inner.metadata, columns);
+        for i in 0..self.batch_count() {
+            let batch = self.read_batch(i, |id, values| hasher.update(id, values))?;
             progress(batch.len() as u64);
         }
         let hash = hasher.finish(self.rows());
@@ -286,36 +357,4 @@ fn check_crc(bytes: &[u8], stored: u32, place: &str) -> Result<()> {
     let what =
         format_args!("its checksum is {found:08x} and was {stored:08x} when written").to_string();
     Err(damaged(place, what))
-}
-
-/// Holds the stored columns against the header: each column is stored with a
-/// type it may have, or is constant, and not both.
-fn complete(header: &mut Header, layout: &Layout, place: &str) -> Result<()> {
-    let samples = header.pattern.samples();
-    for id in ColumnId::ALL {
-        let name = id.name();
-        let hint = "correct the writer of the trace (docs/TRACE_FORMAT.md)";
-        let stored = layout.columns.iter().find(|c| c.0 == id).map(|c| c.1);
-        match (stored, header.constants.contains_key(&id)) {
-            (Some(value_type), false) if id.accepts(value_type, samples) => {}
-            (Some(value_type), false) => {
-                let what = format_args!("the column '{name}' cannot be {value_type}").to_string();
-                return Err(Error::invalid(place, what, hint));
-            }
-            (None, true) => {}
-            (Some(_), true) => {
-                let what = format_args!("'{name}' is both a column and a constant").to_string();
-                return Err(Error::invalid(place, what, hint));
-            }
-            (None, false) => {
-                let what = format_args!("the column '{name}' is missing").to_string();
-                return Err(Error::invalid(place, what, hint));
-            }
-        }
-    }
-    let single = [ColumnId::R, ColumnId::G, ColumnId::B]
-        .iter()
-        .any(|id| layout.columns.contains(&(*id, ValueType::F32)));
-    header.colour = if single { ColourFormat::F32 } else { ColourFormat::F16 };
-    Ok(())
 }

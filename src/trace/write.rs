@@ -10,10 +10,11 @@ use arrow_schema::{ArrowError, SchemaRef};
 use crate::error::{Error, Result};
 use crate::output::OutputFile;
 use crate::trace::batch::{BatchBuilder, MAX_BATCH_ROWS, schema};
+use crate::trace::column::ColumnId;
 use crate::trace::content::ContentHasher;
 use crate::trace::fragment::Fragment;
 use crate::trace::header::Header;
-use crate::trace::seal::{CHECKSUMS, CHECKSUMS_KIND, Seal, SealingWriter};
+use crate::trace::seal::{CHECKSUMS, CHECKSUMS_KIND, SealingWriter};
 
 crate::options! {
     /// How the columns of a trace are stored.
@@ -107,7 +108,10 @@ impl<W: Write> TraceWriter<W> {
         file.get_mut().end_block(0);
         Ok(TraceWriter {
             builder: BatchBuilder::new(&header)?,
-            content: ContentHasher::new(&header),
+            content: ContentHasher::new(
+                &header.to_metadata(),
+                ColumnId::ALL.into_iter().filter(|id| !header.constants.contains_key(id)),
+            ),
             header,
             schema,
             batch_rows: options.batch_rows,
@@ -146,7 +150,11 @@ impl<W: Write> TraceWriter<W> {
     fn flush_batch(&mut self) -> Result<()> {
         let batch = self.builder.take();
         batch.check(&self.header, &format!("{}, after row {}", self.place, self.rows))?;
-        self.content.update(&batch);
+        for (id, stored) in batch.buffers() {
+            if let Some((value_type, bytes)) = stored {
+                self.content.update(id, &bytes.as_slice()[..batch.len() * value_type.bytes()]);
+            }
+        }
         let record_batch = batch.to_record_batch(&self.schema);
         self.file.write(&record_batch).map_err(|e| arrow_error(&self.place, e))?;
         self.file.get_mut().end_block(batch.len() as u64);
@@ -162,15 +170,13 @@ impl<W: Write> TraceWriter<W> {
         if self.builder.len() > 0 {
             self.flush_batch()?;
         }
-        let blocks = self.file.get_ref().blocks().to_vec();
-        let bytes = blocks.last().map_or(0, |b| b.end);
         let content = self.content.finish(self.rows);
-        let seal = Seal { blocks, rows: self.rows, content: content.clone() };
-        for (key, value) in seal.to_metadata() {
+        for (key, value) in self.file.get_mut().begin_tail(self.rows, content.clone()) {
             self.file.write_metadata(key, value);
         }
         let sink = self.file.into_inner().map_err(|e| arrow_error(&self.place, e))?;
-        Ok((sink.into_inner(), Written { rows: self.rows, content, bytes }))
+        let (sink, bytes) = sink.finish().map_err(|e| Error::io("write", &self.place, e))?;
+        Ok((sink, Written { rows: self.rows, content, bytes }))
     }
 }
 

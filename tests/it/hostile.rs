@@ -8,14 +8,14 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use arrow_array::types::Float32Type;
+use arrow_array::types::{Float32Type, Int32Type};
 use arrow_array::{
-    Array, ArrayRef, Float32Array, Int64Array, PrimitiveArray, RecordBatch, StringArray,
-    UInt16Array,
+    Array, ArrayRef, DictionaryArray, Float32Array, Int64Array, PrimitiveArray, RecordBatch,
+    StringArray, UInt16Array,
 };
 use arrow_ipc::CompressionType;
 use arrow_ipc::reader::FileReader;
-use arrow_ipc::writer::{FileWriter, IpcWriteOptions};
+use arrow_ipc::writer::{FileWriter, IpcWriteOptions, StreamWriter};
 use arrow_schema::{Field, Schema};
 use screendoor::capture::{Capture, CaptureOptions};
 use screendoor::trace::{Header, Trace, WriteOptions};
@@ -58,8 +58,30 @@ pub fn arrow_file(
     bytes
 }
 
+/// The same as a stream.
+pub fn arrow_stream(metadata: HashMap<String, String>, columns: Vec<(&str, ArrayRef)>) -> Vec<u8> {
+    let file = arrow_file(metadata, columns, None);
+    let reader = FileReader::try_new(std::io::Cursor::new(file), None).unwrap();
+    let mut writer = StreamWriter::try_new(Vec::new(), &reader.schema()).unwrap();
+    reader.for_each(|batch| writer.write(&batch.unwrap()).unwrap());
+    writer.into_inner().unwrap()
+}
+
+/// The length of the first batch's body, as a stream's message has it.
+fn body_length(stream: &[u8]) -> [u8; 8] {
+    let message = |at: usize| {
+        let length = u32::from_le_bytes(stream[at + 4..at + 8].try_into().unwrap()) as usize;
+        (at + 8 + length, &stream[at + 8..at + 8 + length])
+    };
+    let (batch, _) = message(0);
+    arrow_ipc::root_as_message(message(batch).1).unwrap().bodyLength().to_le_bytes()
+}
+
 /// A good trace taken apart: the schema's metadata and the columns.
-fn parts(header: &Header, rows: usize) -> (HashMap<String, String>, Vec<(&'static str, ArrayRef)>) {
+pub fn parts(
+    header: &Header,
+    rows: usize,
+) -> (HashMap<String, String>, Vec<(&'static str, ArrayRef)>) {
     let sealed = trace_bytes(header, &random_fragments(header, rows, 3), WriteOptions::default());
     let mut reader = FileReader::try_new(std::io::Cursor::new(sealed), None).unwrap();
     let schema = reader.schema();
@@ -114,6 +136,12 @@ fn traces() -> Vec<Hostile> {
         (0..ROWS).map(|i| (i != 5).then_some(0.5_f32)).collect();
     let mut missing = columns.clone();
     missing.remove(3);
+    let wide: Vec<i64> = (0..ROWS).map(|i| if i == 5 { 1 << 16 } else { 1 }).collect();
+    let names = StringArray::from(vec!["1"; ROWS]);
+    let dictionary: DictionaryArray<Int32Type> = vec!["a"; ROWS].into_iter().collect();
+    let mut tagged = columns.clone();
+    tagged.insert(4, ("tag", Arc::new(dictionary)));
+    let stream = arrow_stream(metadata.clone(), columns.clone());
     let huge = (1_u64 << 40).to_le_bytes();
     let x_length = (2 * ROWS as u64).to_le_bytes();
 
@@ -147,7 +175,7 @@ fn traces() -> Vec<Hostile> {
                 vec![("name", Arc::new(StringArray::from(vec!["a", "b"])) as ArrayRef)],
                 None,
             ),
-            "'name' is no column of a trace",
+            "the metadata 'screendoor.version' is missing",
             "a good Arrow file of something else",
         ),
         hostile(
@@ -200,9 +228,45 @@ fn traces() -> Vec<Hostile> {
         ),
         hostile(
             "wide-x.arrow",
-            with_column("x", Arc::new(Int64Array::from(vec![1_i64; ROWS]))),
-            "'x' has a type",
-            "a column of another type",
+            with_column("x", Arc::new(Int64Array::from(wide))),
+            "row 5: column 'x' holds 65536 as int64, which no uint16 is",
+            "a column of a wider type with a value that does not fit",
+        ),
+        hostile(
+            "text-x.arrow",
+            with_column("x", Arc::new(names)),
+            "the column 'x' is of type utf8; cast it to uint16",
+            "a column of text",
+        ),
+        hostile(
+            "dictionary.arrow",
+            arrow_file(metadata.clone(), tagged, None),
+            "the column 'tag' is dictionary-encoded",
+            "a column more, dictionary-encoded",
+        ),
+        hostile(
+            "cut-stream.arrow",
+            stream[..stream.len() - 8].to_vec(),
+            "truncated",
+            "a stream without its end marker",
+        ),
+        hostile(
+            "long-stream.arrow",
+            replaced(&stream, &body_length(&stream), &(1_u64 << 60).to_le_bytes()),
+            "truncated",
+            "a stream whose batch claims 2^60 bytes",
+        ),
+        hostile(
+            "unsealed.arrow",
+            with_metadata("checksums", "crc32"),
+            "says that it is sealed and has no seal",
+            "a sealed trace that another program wrote anew",
+        ),
+        hostile(
+            "parquet.arrow",
+            b"PAR1\x15\x04\x15\x10PAR1".to_vec(),
+            "it is a Parquet file, no Arrow IPC file; convert it",
+            "another format that holds tables",
         ),
         hostile(
             "coverage.arrow",

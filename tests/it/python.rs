@@ -1,6 +1,9 @@
 //! The Python of `docs/TRACE_FORMAT.md` and `docs/STUDIES.md` does what the documents say, and
 //! FLIP is what its authors' Python package makes of the same pictures.
 
+mod lk;
+mod readers;
+
 use std::path::Path;
 use std::process::Command;
 
@@ -8,7 +11,7 @@ use screendoor::metrics::{Flip, FlipMap};
 use screendoor::picture::Picture;
 use screendoor::report::export::{arrow, json_lines};
 use screendoor::study::record::Record;
-use screendoor::trace::{Trace, statistics};
+use screendoor::trace::{Checksums, Trace, statistics};
 
 use crate::util::{design, header, picture, random_fragments, trace_bytes};
 
@@ -22,21 +25,24 @@ fn python_blocks(document: &str) -> Vec<String> {
     blocks.map(|rest| rest.split("```").next().unwrap().to_string()).collect()
 }
 
+fn python() -> String {
+    std::env::var("SCREENDOOR_PYTHON").unwrap_or("python3".into())
+}
+
 fn run(folder: &Path, program: &str) -> String {
-    let python = std::env::var("SCREENDOOR_PYTHON").unwrap_or("python3".into());
-    let output = Command::new(python).args(["-c", program]).current_dir(folder).output().unwrap();
+    let output = Command::new(python()).args(["-c", program]).current_dir(folder).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout).unwrap()
 }
 
 #[test]
 fn the_document_shows_writing_and_reading() {
-    assert_eq!(python_blocks(&document("TRACE_FORMAT.md")).len(), 2);
+    assert_eq!(python_blocks(&document("TRACE_FORMAT.md")).len(), 4);
     assert_eq!(python_blocks(&document("STUDIES.md")).len(), 1);
 }
 
 #[test]
-#[ignore = "needs python3 with pyarrow and numpy (SCREENDOOR_PYTHON names another interpreter)"]
+#[ignore = "needs python3 with pyarrow, numpy, duckdb, blake3 (SCREENDOOR_PYTHON names another)"]
 fn pyarrow_writes_and_reads_traces() {
     let folder = tempfile::tempdir().unwrap();
     let blocks = python_blocks(&document("TRACE_FORMAT.md"));
@@ -58,6 +64,14 @@ fn pyarrow_writes_and_reads_traces() {
     }
     let said = run(folder.path(), &blocks[1]);
     assert!(said.contains("two layers from Python 6144 fragments"), "{said}");
+
+    // DuckDB is asked as the document says, and what is sealed as it says holds.
+    let said = run(folder.path(), &blocks[2]);
+    assert!(said.contains("3072") && said.contains("0.25"), "{said}");
+    run(folder.path(), &blocks[3]);
+    let sealed = Trace::open(folder.path().join("sealed.arrow")).unwrap();
+    assert_eq!(sealed.checksums(), Checksums::All);
+    assert_eq!(sealed.verify(|_| ()).unwrap(), trace.verify(|_| ()).unwrap());
 
     // The same reader opens what we write.
     let header = header(20, 20, 8);

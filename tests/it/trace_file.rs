@@ -124,8 +124,7 @@ fn no_bit_flip_passes_and_none_panics() {
     for compression in COMPRESSIONS {
         let options = WriteOptions { compression, batch_rows: 128 };
         let good = trace_bytes(&header, &fragments, options);
-        let hash = read_all(good.clone()).unwrap();
-        let mut silent = 0;
+        read_all(good.clone()).unwrap();
         for bit in 0..good.len() * 8 {
             // Every bit of the frame; every 13th of the bulk.
             let byte = bit / 8;
@@ -135,17 +134,8 @@ fn no_bit_flip_passes_and_none_panics() {
             }
             let mut bytes = good.clone();
             bytes[byte] ^= 1 << (bit % 8);
-            match read_all(bytes) {
-                Err(_) => {}
-                // Padding within the footer is read by nobody: the content must stand.
-                Ok(found) => {
-                    assert_eq!(found, hash, "bit {bit} changed the content silently");
-                    silent += 1;
-                }
-            }
+            assert!(read_all(bytes).is_err(), "{compression:?}: bit {bit} passes");
         }
-        eprintln!("{compression:?}: {silent} bits carry nothing");
-        assert!(silent < 4000, "{silent}");
     }
 }
 
@@ -155,7 +145,7 @@ fn no_truncation_or_splice_passes_and_none_panics() {
     let fragments = random_fragments(&header, 200, 6);
     let options = WriteOptions { compression: Compression::Zstd, batch_rows: 64 };
     let good = trace_bytes(&header, &fragments, options);
-    let hash = read_all(good.clone()).unwrap();
+    read_all(good.clone()).unwrap();
     for length in 0..good.len() {
         let error = read_all(good[..length].to_vec()).unwrap_err().to_string();
         assert!(error.starts_with("damaged"), "{error}");
@@ -170,10 +160,7 @@ fn no_truncation_or_splice_passes_and_none_panics() {
             1 => bytes[from..to].fill(random.word() as u8),
             _ => bytes[from..to].reverse(),
         }
-        // A change that only touches padding leaves the content; no other passes.
-        if let Ok(found) = read_all(bytes) {
-            assert_eq!(found, hash);
-        }
+        assert!(bytes == good || read_all(bytes).is_err());
     }
 }
 
