@@ -20,6 +20,7 @@ mod layout;
 mod read;
 mod seal;
 mod stats;
+mod ties;
 mod write;
 
 pub use batch::{Batch, MAX_BATCH_ROWS};
@@ -30,4 +31,5 @@ pub use fragment::{DepthPlane, Fragment, MAX_SAMPLES, SampleMask, Unorm32};
 pub use header::{ColourFormat, FORMAT_VERSION, Header, MAX_SIDE, SamplePattern};
 pub use read::Trace;
 pub use stats::{AlphaStatistics, Distribution, Objects, Statistics, statistics};
+pub use ties::tied_fragments;
 pub use write::{Compression, TraceWriter, WriteOptions, Written};
