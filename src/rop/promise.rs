@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 pub enum Promise {
     /// It is not given.
     Never,
-    /// It holds where no two fragments that cover a sample have the same depth there: where
-    /// [`tied_fragments`](crate::trace::tied_fragments) finds none.
+    /// It holds where no two fragments that cover a sample have the same depth, there or at
+    /// the pixel's centre: where [`tied_fragments`](crate::trace::tied_fragments) finds none.
     DistinctDepths,
     /// It holds for every trace.
     Always,

@@ -201,8 +201,12 @@ pub fn promises(values: &Values, basic: Promises) -> Promises {
     let method: Method = values.choice(METHOD.name);
     let together = over_opaque::of(values) == Opaque::Together;
     let sums = method != Method::Basic;
-    // The strongest promise that the method leaves of the samples' own.
-    let by_depth = if method.depth_based() { Promise::DistinctDepths } else { Promise::Always };
+    // The strongest promise that the method leaves of the samples' own. Opaque fragments
+    // that are drawn first lie behind transparent ones of their depth that came earlier.
+    let by_depth = match method.depth_based() || (sums && !together) {
+        true => Promise::DistinctDepths,
+        false => Promise::Always,
+    };
     Promises {
         unbiased: if method.corrected() { Promise::Never } else { basic.unbiased.min(by_depth) },
         consistent: basic.consistent.min(by_depth),

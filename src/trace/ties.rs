@@ -14,9 +14,10 @@ const AT_A_TIME: u64 = 1 << 24;
 /// what it covers.
 type Row = (u8, DepthPlane, SampleMask);
 
-/// How many fragments share a depth with another one: they cover a sample, among the first
-/// `samples`, at which another fragment of the pixel that covers it has the same 32-bit
-/// depth. There the drawing order alone says which lies in front.
+/// How many fragments share a depth with another one: both cover a sample among the first
+/// `samples`, and have the same 32-bit depth there or at the pixel's centre. Where depths
+/// are the same at the sample, the drawing order alone says which lies in front; where they
+/// are at the centre, designs that know a fragment by its depth there take the two for one.
 ///
 /// Exact, for every sample. The trace is read once to count and then once for every 16
 /// million fragments.
@@ -83,12 +84,14 @@ fn tied_in_tile(mut rows: Vec<Row>, positions: &[[i8; 2]]) -> u64 {
         let mut is_tied = vec![false; pixel.len()];
         let mut depths = Vec::with_capacity(pixel.len());
         for (s, position) in positions.iter().enumerate() {
-            depths.clear();
-            let here = pixel.iter().enumerate().filter(|(_, row)| row.2.contains(s));
-            depths.extend(here.map(|(i, row)| (row.1.at(*position), i)));
-            depths.sort_unstable();
-            for pair in depths.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
-                pair.iter().for_each(|(_, i)| is_tied[*i] = true);
+            for at in [*position, [0, 0]] {
+                depths.clear();
+                let here = pixel.iter().enumerate().filter(|(_, row)| row.2.contains(s));
+                depths.extend(here.map(|(i, row)| (row.1.at(at), i)));
+                depths.sort_unstable();
+                for pair in depths.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
+                    pair.iter().for_each(|(_, i)| is_tied[*i] = true);
+                }
             }
         }
         tied += is_tied.iter().filter(|t| **t).count() as u64;
@@ -99,7 +102,9 @@ fn tied_in_tile(mut rows: Vec<Row>, positions: &[[i8; 2]]) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trace::{ColourFormat, Fragment, Header, SamplePattern, TraceWriter, Unorm32, WriteOptions};
+    use crate::trace::{
+        ColourFormat, Fragment, Header, SamplePattern, TraceWriter, Unorm32, WriteOptions,
+    };
 
     /// The tied fragments of a list of (pixel, coverage, depth, slope along x).
     fn of(list: &[(u16, u64, u32, i32)], samples: u32, at_a_time: u64) -> u64 {
@@ -133,7 +138,7 @@ mod tests {
 
     #[test]
     fn depths_are_shared_where_coverage_meets_and_nowhere_else() {
-        let cases: [(&[(u16, u64, u32, i32)], u64); 7] = [
+        let cases: [(&[(u16, u64, u32, i32)], u64); 9] = [
             (&[(0, 3, 5, 0), (0, 3, 6, 0)], 0),
             (&[(0, 3, 5, 0), (0, 2, 5, 0), (0, 1, 7, 0)], 2),
             // Pieces of one pixel, and pixels of one depth.
@@ -142,6 +147,9 @@ mod tests {
             // Planes that meet at the second sample alone.
             (&[(0, 3, 1000, 0), (0, 3, 900, 200)], 2),
             (&[(0, 3, 1000, 0), (0, 1, 900, 200)], 0),
+            // The same at the centre, which is no sample that both cover.
+            (&[(0, 2, 1000, 0), (0, 3, 1000, 160), (0, 1, 1000, 0)], 3),
+            (&[(0, 2, 1000, 0), (0, 2, 1000, 160), (0, 1, 1001, 0)], 2),
             // Clamped to the near end of the range.
             (&[(0, 2, 5, -1000), (0, 2, 9, -1000), (0, 2, 9, 0)], 2),
         ];
