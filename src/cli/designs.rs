@@ -50,8 +50,8 @@ fn print(documents: &[Document], console: &Console) -> Result<()> {
         {
             console
                 .print(format_args!("{}\n  {}\n  {}", info.name, info.summary, info.citation))?;
-            let port = gpu.then_some("runs on GPUs too");
-            let words: Vec<&str> = promises.words().into_iter().chain(port).collect();
+            let port = gpu.then(|| "runs on GPUs too".to_string());
+            let words: Vec<String> = promises.words().into_iter().chain(port).collect();
             console.print(format_args!("  {}", words.join(", ")))?;
             print_params(info.params, console)?;
         }

@@ -131,6 +131,14 @@ fn print(trace: &Trace, stats: &Statistics, console: &Console) -> Result<()> {
         let range = format!("    {:.1}-{:.1}", i as f64 / 10.0, (i + 1) as f64 / 10.0);
         line(&range, bar(*n, stats.fragments))?;
     }
+    line(
+        "at equal depths",
+        format!(
+            "{} ({:.1} % of the fragments share a depth with another one at a sample)",
+            grouped(stats.tied_fragments),
+            share(stats.tied_fragments, stats.fragments)
+        ),
+    )?;
     if let Some([near, far]) = stats.depth {
         line("depth", format!("{near:.6} to {far:.6} of the range"))?;
     }

@@ -237,7 +237,7 @@ fn print_errors(errors: &ErrorsByRegion, console: &Console) -> Result<()> {
         }
         let spread = |v: f64| if seeds > 1 { format!(" ± {v:.3}") } else { String::new() };
         console.print(format_args!(
-            "  {name:<8} RMSE {:.3}{} linear, {:.3}{} sRGB; mean {:+.4}{}; max {:.1}",
+            "  {name:<8} RMSE {:.3}{} linear, {:.3}{} sRGB; mean error {:+.4}{}; max {:.1}",
             e.rmse.value,
             spread(e.rmse.half_width()),
             e.rmse_srgb.value,
@@ -248,9 +248,12 @@ fn print_errors(errors: &ErrorsByRegion, console: &Console) -> Result<()> {
         ))?;
         if let (Some(variance), Some(bias)) = (e.variance, e.bias_squared) {
             // Without a word a negative square looks like a mistake.
+            let half = bias.half_width();
+            let half = if half.is_finite() { format!(" ± {half:.4}") } else { String::new() };
+            let bias = bias.value;
             let why = if bias < 0.0 { " (an unbiased estimate: it scatters around 0)" } else { "" };
             console.print(format_args!(
-                "  {:<8} variance {variance:.3}, squared bias {bias:+.4}{why}",
+                "  {:<8} variance {variance:.3}, squared bias {bias:+.4}{half}{why}",
                 ""
             ))?;
         }

@@ -230,7 +230,7 @@ pub(super) fn reported(
             series: series.clone(),
             summary: design.info().summary.to_string(),
             citation: design.info().citation.to_string(),
-            promises: design.promises().words().into_iter().map(str::to_string).collect(),
+            promises: design.promises().words(),
         });
     }
     let results = write_report(store, about)?;

@@ -52,14 +52,13 @@ impl Blueprint for ABuffer {
 
     fn promises(values: &Values) -> Promises {
         Promises {
-            unbiased: false,
-            consistent: false,
             order: match values.choice("overflow") {
                 Overflow::Furthest => OrderPromise::Independent,
                 Overflow::Newest | Overflow::Blend => OrderPromise::Dependent,
             },
             exact_opaque: OpaquePromise::where_first(values, OpaquePromise::Never),
             seeded: false,
+            ..Promises::NONE
         }
     }
 }

@@ -48,12 +48,11 @@ impl Blueprint for Adaptive {
 
     fn promises(values: &Values) -> Promises {
         Promises {
-            unbiased: false,
-            consistent: false,
             // Which nodes are removed depends on what has come so far.
             order: OrderPromise::Dependent,
             exact_opaque: OpaquePromise::where_first(values, OpaquePromise::Never),
             seeded: false,
+            ..Promises::NONE
         }
     }
 }

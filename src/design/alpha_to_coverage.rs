@@ -32,14 +32,13 @@ impl Blueprint for AlphaToCoverage {
 
     fn promises(values: &Values) -> Promises {
         Promises {
-            unbiased: false,
-            consistent: false,
             order: match depth_bits::tells_apart(values) {
                 true => OrderPromise::Independent,
                 false => OrderPromise::Dependent,
             },
             exact_opaque: OpaquePromise::Always,
             seeded: false,
+            ..Promises::NONE
         }
     }
 }

@@ -32,11 +32,10 @@ impl Blueprint for Blend {
 
     fn promises(values: &Values) -> Promises {
         Promises {
-            unbiased: false,
-            consistent: false,
             order: OrderPromise::Dependent,
             exact_opaque: OpaquePromise::where_first(values, OpaquePromise::Never),
             seeded: false,
+            ..Promises::NONE
         }
     }
 }

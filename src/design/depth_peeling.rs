@@ -54,12 +54,11 @@ impl Blueprint for DepthPeeling {
 
     fn promises(_: &Values) -> Promises {
         Promises {
-            unbiased: false,
-            consistent: false,
             order: OrderPromise::Independent,
             // The nearest layer of every sample is always peeled.
             exact_opaque: OpaquePromise::Always,
             seeded: false,
+            ..Promises::NONE
         }
     }
 }

@@ -57,12 +57,11 @@ impl Blueprint for HashedAlpha {
     fn promises(values: &Values) -> Promises {
         let apart = depth_bits::tells_apart(values);
         Promises {
-            // Surfaces of one object that lie within a cell share their threshold.
-            unbiased: false,
-            consistent: false,
             order: if apart { OrderPromise::Independent } else { OrderPromise::Dependent },
             exact_opaque: OpaquePromise::Always,
             seeded: true,
+            // Surfaces of one object that lie within a cell share their threshold.
+            ..Promises::NONE
         }
     }
 }

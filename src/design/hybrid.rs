@@ -33,13 +33,12 @@ impl Blueprint for Hybrid {
 
     fn promises(values: &Values) -> Promises {
         Promises {
-            unbiased: false,
-            consistent: false,
             // Which layers end in the core and which in the tail does not depend on the
             // order, but the tail's sums are rounded as they come.
             order: OrderPromise::UpToRounding,
             exact_opaque: OpaquePromise::where_first(values, OpaquePromise::WholePixels),
             seeded: false,
+            ..Promises::NONE
         }
     }
 }

@@ -39,13 +39,12 @@ impl Blueprint for KBuffer {
 
     fn promises(values: &Values) -> Promises {
         Promises {
-            // What is dropped is missing; and layers that cross within a pixel are
-            // ordered as at its centre.
-            unbiased: false,
-            consistent: false,
             order: OrderPromise::Independent,
             exact_opaque: OpaquePromise::where_first(values, OpaquePromise::WholePixels),
             seeded: false,
+            // What is dropped is missing; and layers that cross within a pixel are
+            // ordered as at its centre.
+            ..Promises::NONE
         }
     }
 }

@@ -16,8 +16,8 @@ use crate::rop::tracked::{
     chance_decides_surfaces,
 };
 use crate::rop::{
-    Blueprint, Engine, Family, Frame, Info, OpaquePromise, OrderPromise, Port, Promises, Reference,
-    Stochastic, depth_bits,
+    Blueprint, Engine, Family, Frame, Info, OpaquePromise, OrderPromise, Port, Promise, Promises,
+    Reference, Stochastic, depth_bits,
 };
 
 /// The design's entry in the registry.
@@ -86,11 +86,12 @@ impl Blueprint for LaineKarras {
         let scrambled = reference.scrambles();
         let apart = depth_bits::tells_apart(values);
         let basic = Promises {
-            unbiased: apart && scrambled && !by_chance,
+            unbiased: Promise::always_if(apart && scrambled && !by_chance),
             // Unscrambled values still share out each stored surface evenly, as long as
             // its samples are numbered in a row.
-            consistent: apart
-                && (scrambled || (values.flag(COMPACT.name) && values.flag(SORT.name))),
+            consistent: Promise::always_if(
+                apart && (scrambled || (values.flag(COMPACT.name) && values.flag(SORT.name))),
+            ),
             order: OrderPromise::Dependent,
             exact_opaque: OpaquePromise::Always,
             seeded: true,

@@ -60,13 +60,12 @@ impl Blueprint for MomentBased {
 
     fn promises(values: &Values) -> Promises {
         Promises {
-            unbiased: false,
-            consistent: false,
             // How much a reconstruction differs with the moments' rounding grows as their
             // matrix nears a singular one; only the bias bounds it.
             order: OrderPromise::AmplifiedRounding,
             exact_opaque: OpaquePromise::where_first(values, OpaquePromise::Never),
             seeded: false,
+            ..Promises::NONE
         }
     }
 }

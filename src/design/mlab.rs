@@ -39,12 +39,11 @@ impl Blueprint for Mlab {
 
     fn promises(values: &Values) -> Promises {
         Promises {
-            unbiased: false,
-            consistent: false,
             // What comes between two that are already merged cannot part them.
             order: OrderPromise::Dependent,
             exact_opaque: OpaquePromise::where_first(values, OpaquePromise::WholePixels),
             seeded: false,
+            ..Promises::NONE
         }
     }
 }

@@ -143,9 +143,6 @@ impl Blueprint for Slab {
             && values.choice::<Coverage>(COVERAGE.name) == Coverage::Share;
         let unsummed = values.choice::<Normalise>("normalise") == Normalise::None;
         Promises {
-            unbiased: false,
-            // Samples of a pixel share their bits.
-            consistent: false,
             // What finds no layer before it enters whatever came earlier, and where there
             // is room for one alone, the nearest such stays.
             order: match (bits == 0 || complete || values.integer(LAYERS.name) == 1, unsummed) {
@@ -155,6 +152,8 @@ impl Blueprint for Slab {
             },
             exact_opaque: OpaquePromise::where_first(values, OpaquePromise::Never),
             seeded: bits != 0,
+            // Samples of a pixel share their bits.
+            ..Promises::NONE
         }
     }
 }

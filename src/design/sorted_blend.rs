@@ -46,13 +46,12 @@ impl Blueprint for SortedBlend {
 
     fn promises(values: &Values) -> Promises {
         Promises {
-            unbiased: false,
-            consistent: false,
             // Primitives of equal mean depth, and a primitive's own fragments in a
             // pixel, are blended as they come.
             order: OrderPromise::Dependent,
             exact_opaque: OpaquePromise::where_first(values, OpaquePromise::Never),
             seeded: false,
+            ..Promises::NONE
         }
     }
 }

@@ -21,7 +21,7 @@ use crate::rop::tracked::{
 };
 use crate::rop::{
     Blueprint, Declaration, Dither, Engine, Family, Frame, Info, OnDevice, OpaquePromise,
-    OrderPromise, PixelWords, Port, Probe, Promises, Reference, ReferenceKey, Round, Site,
+    OrderPromise, PixelWords, Port, Probe, Promise, Promises, Reference, ReferenceKey, Round, Site,
     Stochastic, depth_bits,
 };
 
@@ -105,8 +105,8 @@ impl Blueprint for Systematic {
             || values.choice::<Reference>(REFERENCE.name).scrambles();
         let apart = depth_bits::tells_apart(values);
         let basic = Promises {
-            unbiased: apart && scrambled && !chance_decides_surfaces(values),
-            consistent: apart,
+            unbiased: Promise::always_if(apart && scrambled && !chance_decides_surfaces(values)),
+            consistent: Promise::always_if(apart),
             order: OrderPromise::Dependent,
             exact_opaque: OpaquePromise::Always,
             seeded: true,

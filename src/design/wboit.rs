@@ -82,11 +82,10 @@ impl Blueprint for WeightedBlended {
 
     fn promises(values: &Values) -> Promises {
         Promises {
-            unbiased: false,
-            consistent: false,
             order: OrderPromise::UpToRounding,
             exact_opaque: OpaquePromise::where_first(values, OpaquePromise::Never),
             seeded: false,
+            ..Promises::NONE
         }
     }
 }

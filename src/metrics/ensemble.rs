@@ -17,7 +17,12 @@ pub struct Ensemble<'a> {
     runs: Vec<Vec<Errors>>,
     /// Sums over the runs of the error and of its square, at each pixel.
     sums: TileMap<(TilePixels, TilePixels)>,
-    /// The same of the untouched pixels' common error.
+    /// One row a region, one entry for every two runs: the mean of the product of their
+    /// errors, whose expectation is the squared bias.
+    products: Vec<Vec<f64>>,
+    /// A run that has no second one yet.
+    waiting: Option<Picture>,
+    /// The same as `sums` of the untouched pixels' common error.
     rest: ([f64; 3], [f64; 3]),
 }
 
@@ -41,8 +46,11 @@ pub struct EnsembleErrors {
     pub variance: Option<f64>,
     /// Mean over pixels and channels of the squared bias, estimated without bias
     /// of its own: scatters around 0 for an unbiased design, so it can be
-    /// negative. In squared units; `None` for a single seed.
-    pub bias_squared: Option<f64>,
+    /// negative. In squared units; `None` for a single seed. The half-width of its
+    /// interval is that of the mean of products of two runs' errors, no run in two of
+    /// them: never too narrow, as the estimate itself averages over all such pairings.
+    /// Below four seeds it is infinite.
+    pub bias_squared: Option<Estimate>,
     /// What a viewer of a pixel sees over frames of different seeds; `None` for a single
     /// seed or an empty region.
     pub temporal: Option<Temporal>,
@@ -56,6 +64,8 @@ impl<'a> Ensemble<'a> {
             regions: regions.to_vec(),
             runs: vec![Vec::new(); regions.len()],
             sums: TileMap::new(reference.grid()),
+            products: vec![Vec::new(); regions.len()],
+            waiting: None,
             rest: ([0.0; 3], [0.0; 3]),
         }
     }
@@ -67,6 +77,14 @@ impl<'a> Ensemble<'a> {
     pub fn add(&mut self, picture: &Picture) {
         for (runs, region) in self.runs.iter_mut().zip(&self.regions) {
             runs.push(errors(picture, self.reference, region));
+        }
+        match self.waiting.take() {
+            None => self.waiting = Some(picture.clone()),
+            Some(first) => {
+                for (products, region) in self.products.iter_mut().zip(&self.regions) {
+                    products.push(mean_product(&first, picture, self.reference, region));
+                }
+            }
         }
         let add = |sum: &mut [f64; 3], square: &mut [f64; 3], a: [f64; 3], b: [f64; 3]| {
             for i in 0..3 {
@@ -140,10 +158,12 @@ impl<'a> Ensemble<'a> {
 
     /// The errors over the runs so far, region by region.
     pub fn finish(&self) -> Vec<EnsembleErrors> {
-        self.regions.iter().zip(&self.runs).map(|(region, runs)| self.over(region, runs)).collect()
+        (0..self.regions.len()).map(|region| self.over(region)).collect()
     }
 
-    fn over(&self, region: &Region, runs: &[Errors]) -> EnsembleErrors {
+    fn over(&self, place: usize) -> EnsembleErrors {
+        let (region, runs) = (self.regions[place], &self.runs[place]);
+        let products = &self.products[place];
         let n = runs.len() as f64;
         let squares = |f: fn(&Errors) -> f64| {
             let squares: Vec<f64> = runs.iter().map(|r| f(r) * f(r)).collect();
@@ -172,10 +192,39 @@ impl<'a> Ensemble<'a> {
             mean: Estimate::of(&means),
             max: runs.iter().map(|r| r.max).fold(0.0, f64::max),
             variance: known(variance),
-            bias_squared: known(bias_squared),
+            bias_squared: known(bias_squared).map(|value| {
+                let half = match products.len() {
+                    0 | 1 => f64::INFINITY,
+                    _ => Estimate::of(products).half_width(),
+                };
+                Estimate { value, low: value - half, high: value + half }
+            }),
             temporal: deviations.finish(),
         }
     }
+}
+
+/// The mean over a region's pixels and channels of the product of two pictures' errors, in
+/// squared 8-bit units.
+fn mean_product(a: &Picture, b: &Picture, reference: &Picture, region: &Region) -> f64 {
+    let mut tiles = [a.tiles_with(reference), b.tiles_with(reference)].concat();
+    tiles.sort_unstable();
+    tiles.dedup();
+    let product = |a: [f64; 3], b: [f64; 3], r: [f64; 3]| -> f64 {
+        (0..3).map(|i| (a[i] - r[i]) * (b[i] - r[i])).sum()
+    };
+    let (mut sum, mut visited) = (0.0, 0);
+    for tile in tiles {
+        let [a, b, r] = [a, b, reference].map(|p| (p.tile(tile), p.background()));
+        for within in (0..TILE_PIXELS).filter(|w| region.holds(tile, *w)) {
+            let [a, b, r] = [a, b, r].map(|(t, rest)| t.map_or(rest, |t| t[within]));
+            sum += product(a, b, r);
+            visited += 1;
+        }
+    }
+    let rest = product(a.background(), b.background(), reference.background());
+    sum += rest * (region.pixels() - visited) as f64;
+    sum / (3 * region.pixels()).max(1) as f64 / (UNIT * UNIT)
 }
 
 #[cfg(test)]
@@ -199,9 +248,11 @@ mod tests {
         }
         let e = &ensemble.finish()[0];
         let unit = 255.0 * 255.0;
-        let (variance, bias) = (e.variance.unwrap() / unit, e.bias_squared.unwrap() / unit);
+        let (variance, bias) = (e.variance.unwrap() / unit, e.bias_squared.unwrap().value / unit);
         assert!((variance - 0.04 / 12.0).abs() < 1e-4, "{variance}");
         assert!((bias - 0.03 * 0.03).abs() < 1e-5, "{bias}");
+        let interval = e.bias_squared.unwrap();
+        assert!(interval.low > 0.0 && interval.half_width() < 0.2 * interval.value, "{interval:?}");
         assert!((e.mean.value / 255.0 - 0.03).abs() < 1e-3);
         assert!(e.mean.low > 0.0);
         let rmse = (variance + bias).sqrt() * 255.0;
@@ -214,6 +265,29 @@ mod tests {
         assert!(near(back.rmse.value, e.rmse.value) && near(back.max, e.max));
         let p95 = |e: &EnsembleErrors| e.temporal.unwrap().deviation_p95;
         assert!(near(p95(&back), p95(e)) && near(back.variance.unwrap(), e.variance.unwrap()));
+    }
+
+    #[test]
+    fn the_squared_bias_of_noise_has_0_in_its_interval() {
+        let grid = TileGrid::new(16, 16);
+        let reference = Picture::from_fn(grid, |_, _| [0.5; 3]);
+        let region = Region::frame(grid);
+        let unit = |words| f64::from(hash::<4>(words)) / 2_f64.powi(32);
+        let (mut missed, mut negative) = (0, 0);
+        for trial in 0..400 {
+            let mut ensemble = Ensemble::new(&reference, &[&region]);
+            for seed in 0..6 {
+                ensemble.add(&Picture::from_fn(grid, |x, y| {
+                    std::array::from_fn(|c| unit([trial * 6 + seed, x, y, c as u32]))
+                }));
+            }
+            let e = ensemble.finish()[0].bias_squared.unwrap();
+            missed += u32::from(e.low > 0.0 || e.high < 0.0);
+            negative += u32::from(e.value < 0.0);
+        }
+        // 5 % of 400 at most, plus three standard deviations; about half below 0.
+        assert!(missed <= 20 + 13, "{missed}");
+        assert!((170..230).contains(&negative), "{negative}");
     }
 
     #[test]
@@ -249,7 +323,11 @@ mod tests {
         // Half of the pixels have 1, 3, 1: variance 4/3 about 5/3; the others 1 always.
         assert!((e.variance.unwrap() * UNIT * UNIT - 2.0 / 3.0).abs() < 1e-12);
         let bias_squared = (25.0 / 9.0 - 4.0 / 9.0 + 1.0) / 2.0;
-        assert!((e.bias_squared.unwrap() * UNIT * UNIT - bias_squared).abs() < 1e-12);
+        let found = e.bias_squared.unwrap();
+        assert!((found.value * UNIT * UNIT - bias_squared).abs() < 1e-12);
+        // Three runs make one product: (1·3 + 1·1) / 2, and no interval.
+        assert!((ensemble.products[0][0] * UNIT * UNIT - 2.0).abs() < 1e-12);
+        assert_eq!((found.low, found.high), (f64::NEG_INFINITY, f64::INFINITY));
         assert_eq!(ensemble.z_scores(0).len(), 3 * (256 + 1));
         // Half of the pixels flicker.
         let t = e.temporal.unwrap();

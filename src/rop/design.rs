@@ -12,6 +12,7 @@ use crate::rop::fast::{Count, Width};
 use crate::rop::over_opaque::{self, Opaque};
 use crate::rop::port::Port;
 use crate::rop::primitive_depths::PrimitiveDepths;
+use crate::rop::promise::Promise;
 use crate::rop::replay::Engine;
 use crate::rop::samples::SampleContents;
 use crate::tile::TileGrid;
@@ -160,14 +161,16 @@ pub struct Contents {
 }
 
 /// What a design promises; the conformance suite holds it to each of these, and
-/// shows that what is not promised does not hold.
+/// shows that what is not promised does not hold. Promised is what holds for traces as
+/// `TRACE_FORMAT.md` asks for them: no primitive covers a sample twice.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 pub struct Promises {
     /// Its expectation over seeds is the exact picture.
-    pub unbiased: bool,
+    pub unbiased: Promise,
     /// Its picture approaches the exact one as samples increase.
-    pub consistent: bool,
-    /// What the order does in which fragments of different depths arrive.
+    pub consistent: Promise,
+    /// What the order does in which fragments arrive, where those that share a depth at a
+    /// sample stay in sequence: of them the last lies in front in the exact picture, too.
     pub order: OrderPromise,
     /// Where the picture of opaque fragments is the exact one.
     pub exact_opaque: OpaquePromise,
@@ -176,13 +179,40 @@ pub struct Promises {
 }
 
 impl Promises {
+    /// Nothing is promised.
+    pub const NONE: Promises = Promises {
+        unbiased: Promise::Never,
+        consistent: Promise::Never,
+        order: OrderPromise::Dependent,
+        exact_opaque: OpaquePromise::Never,
+        seeded: false,
+    };
+
+    /// Whether the picture is the same in any order, but for rounding.
+    pub fn same_picture(&self) -> bool {
+        self.order != OrderPromise::Dependent
+    }
+
+    /// Where the expectation over seeds is the same in any order: where each picture is, and
+    /// where it is the exact picture. The noise about it may still differ: with
+    /// `lk:track=covered` near to far has less than far to near.
+    pub fn same_expectation(&self) -> Promise {
+        if self.same_picture() { Promise::Always } else { self.unbiased }
+    }
+
     /// What is promised, in words.
-    pub fn words(&self) -> Vec<&'static str> {
+    pub fn words(&self) -> Vec<String> {
         let order = match self.order {
-            OrderPromise::Independent => "independent of order",
-            OrderPromise::UpToRounding => "independent of order up to rounding",
-            OrderPromise::AmplifiedRounding => "independent of order up to amplified rounding",
+            OrderPromise::Independent => "the same picture in any order",
+            OrderPromise::UpToRounding => "the same picture in any order up to rounding",
+            OrderPromise::AmplifiedRounding => {
+                "the same picture in any order up to amplified rounding"
+            }
             OrderPromise::Dependent => "",
+        };
+        let expectation = match self.same_picture() {
+            true => Promise::Never,
+            false => self.same_expectation(),
         };
         let opaque = match self.exact_opaque {
             OpaquePromise::Always => "exact where opaque",
@@ -192,15 +222,16 @@ impl Promises {
         let list = [
             (self.unbiased, "unbiased"),
             (self.consistent, "consistent"),
-            (!order.is_empty(), order),
-            (!opaque.is_empty(), opaque),
-            (!self.seeded, "the same for every seed"),
+            (Promise::always_if(!order.is_empty()), order),
+            (expectation, "the same expectation in any order"),
+            (Promise::always_if(!opaque.is_empty()), opaque),
+            (Promise::always_if(!self.seeded), "the same for every seed"),
         ];
-        list.iter().filter(|(holds, _)| *holds).map(|(_, word)| *word).collect()
+        list.iter().filter_map(|(promise, what)| promise.words(what)).collect()
     }
 }
 
-/// What the order does in which fragments of different depths arrive.
+/// What the order does in which fragments arrive ([`Promises::order`]).
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum OrderPromise {

@@ -16,6 +16,7 @@ pub mod over_opaque;
 mod pixel_order;
 mod port;
 mod primitive_depths;
+mod promise;
 mod reference_value;
 mod replay;
 mod samples;
@@ -40,6 +41,7 @@ pub use over_opaque::{Opaque, OverOpaque, Transparent};
 pub use pixel_order::{PixelIndex, PixelOrder};
 pub use port::{Constant, Declaration, Field, OnDevice, PixelWords, Port, TileWords};
 pub use primitive_depths::PrimitiveDepths;
+pub use promise::Promise;
 pub use reference_value::{Reference, ReferenceKey, prehash, scramble_lk2011};
 pub use replay::{
     Engine, Explanation, ReplayOptions, Replayed, Step, TileState, Told, Which, draw_pixel,

@@ -17,6 +17,7 @@ use crate::rop::design::{
 use crate::rop::event::Probe;
 use crate::rop::over_opaque::{self, Opaque, OverOpaque, Transparent};
 use crate::rop::port::{Constant, Declaration, OnDevice, PixelWords, Port};
+use crate::rop::promise::Promise;
 use crate::rop::samples::Samples;
 use crate::trace::{Fragment, SampleMask, Unorm32};
 
@@ -194,13 +195,21 @@ where
 /// Correction divides by what chance has found: biased (E sections 4.1 and 4.2).
 /// It is consistent for given alphas: what E calls inconsistent is an alpha that
 /// falls as 1/S. The visibilities of the depth-based methods count fragments at
-/// equal depths as in front of each other, which matters where they overlap.
+/// equal depths as in front of each other: where they overlap, no number of samples or
+/// seeds brings those methods to the exact picture.
 pub fn promises(values: &Values, basic: Promises) -> Promises {
     let method: Method = values.choice(METHOD.name);
     let together = over_opaque::of(values) == Opaque::Together;
     let sums = method != Method::Basic;
+    // The strongest promise that the method leaves of the samples' own. Opaque fragments
+    // that are drawn first lie behind transparent ones of their depth that came earlier.
+    let by_depth = match method.depth_based() || (sums && !together) {
+        true => Promise::DistinctDepths,
+        false => Promise::Always,
+    };
     Promises {
-        unbiased: basic.unbiased && !method.corrected(),
+        unbiased: if method.corrected() { Promise::Never } else { basic.unbiased.min(by_depth) },
+        consistent: basic.consistent.min(by_depth),
         order: match basic.order {
             OrderPromise::Independent if sums => OrderPromise::UpToRounding,
             order => order,

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::metrics::{EnsembleErrors, Estimate};
-use crate::rop::{EventCounts, StateBits};
+use crate::rop::{EventCounts, Promise, Promises, StateBits};
 use crate::study::throughput::Spread;
 
 /// One design at one sample count on one scene, over all seeds of the study.
@@ -35,6 +35,9 @@ pub struct Record {
     pub seeds: u32,
     /// Fragments of the trace that cover one of these samples.
     pub fragments: u64,
+    /// Those of them that share a depth with another one at a sample: where there are any,
+    /// promises that ask for distinct depths are not kept.
+    pub tied_fragments: u64,
     /// Errors against the exact picture of the same samples over the whole frame.
     pub frame: EnsembleErrors,
     /// The same over the pixels with at least one fragment. The figure of the charts.
@@ -69,19 +72,71 @@ pub struct Record {
     pub speed: BTreeMap<String, Speed>,
 }
 
-/// What a design promises, as far as one chooses by it.
+/// What a design promises, as far as one chooses by it. Under what condition is said with
+/// it; [`Record::kept`] is what comes of it on the record's scene.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Promised {
     /// Its expectation over seeds is the exact picture.
-    pub unbiased: bool,
+    pub unbiased: Promise,
     /// Its picture approaches the exact one as samples increase.
-    pub consistent: bool,
-    /// The order in which fragments arrive does not change the expected picture, but for
-    /// rounding: nobody has to sort.
-    pub any_order: bool,
+    pub consistent: Promise,
+    /// Its picture is the same in any order of fragments, but for rounding.
+    pub same_picture: bool,
+    /// Its expectation over seeds is the same in any order of fragments, but for rounding.
+    /// How far pictures scatter about it may still depend on the order.
+    pub same_expectation: Promise,
     /// Its picture depends on the seed: it is noise, not structure.
     pub seeded: bool,
+}
+
+/// The promises that are kept on some scenes.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Kept {
+    /// As [`Promised::unbiased`].
+    pub unbiased: bool,
+    /// As [`Promised::consistent`].
+    pub consistent: bool,
+    /// As [`Promised::same_picture`].
+    pub same_picture: bool,
+    /// As [`Promised::same_expectation`].
+    pub same_expectation: bool,
+}
+
+impl From<Promises> for Promised {
+    fn from(promises: Promises) -> Self {
+        Promised {
+            unbiased: promises.unbiased,
+            consistent: promises.consistent,
+            same_picture: promises.same_picture(),
+            same_expectation: promises.same_expectation(),
+            seeded: promises.seeded,
+        }
+    }
+}
+
+impl Promised {
+    /// What is kept where so many fragments share a depth with another.
+    pub fn kept(self, tied_fragments: u64) -> Kept {
+        Kept {
+            unbiased: self.unbiased.holds(tied_fragments),
+            consistent: self.consistent.holds(tied_fragments),
+            same_picture: self.same_picture,
+            same_expectation: self.same_expectation.holds(tied_fragments),
+        }
+    }
+}
+
+impl Kept {
+    /// What is kept here and there.
+    pub fn and(self, other: Kept) -> Kept {
+        Kept {
+            unbiased: self.unbiased && other.unbiased,
+            consistent: self.consistent && other.consistent,
+            same_picture: self.same_picture && other.same_picture,
+            same_expectation: self.same_expectation && other.same_expectation,
+        }
+    }
 }
 
 /// Error after a Gaussian.
@@ -173,13 +228,20 @@ impl Record {
         })
     }
 
-    /// Root of the mean square of the covered pixels' mean errors, in 8-bit units: what no
-    /// number of seeds removes. Estimated, so that small values are noise; where seeds
-    /// change nothing it is the whole error; `None` for one seed of a design that has more.
-    pub fn bias(&self) -> Option<f64> {
-        match self.covered.bias_squared {
-            Some(b) => Some(b.max(0.0).sqrt()),
-            None => (!self.promises.seeded).then_some(self.covered.rmse.value),
-        }
+    /// The promises that are kept on this scene.
+    pub fn kept(&self) -> Kept {
+        self.promises.kept(self.tied_fragments)
+    }
+
+    /// The share of the fragments that share a depth with another, 0 to 1; `None` where
+    /// there are none.
+    pub fn tied_share(&self) -> Option<f64> {
+        (self.fragments > 0).then(|| self.tied_fragments as f64 / self.fragments as f64)
+    }
+
+    /// Whether seeds change the picture and only one was replayed, so that neither the mean
+    /// error has an interval nor variance and bias are known.
+    pub fn is_one_draw(&self) -> bool {
+        self.promises.seeded && self.seeds < 2
     }
 }

@@ -23,6 +23,7 @@ mod seal;
 mod stats;
 mod stored;
 mod stream;
+mod ties;
 mod write;
 
 pub use batch::{Batch, MAX_BATCH_ROWS};
@@ -33,4 +34,5 @@ pub use fragment::{DepthPlane, Fragment, MAX_SAMPLES, SampleMask, Unorm32};
 pub use header::{ColourFormat, FORMAT_VERSION, Header, MAX_SIDE, SamplePattern};
 pub use read::{Checksums, Trace};
 pub use stats::{AlphaStatistics, Distribution, Objects, Statistics, statistics};
+pub use ties::tied_fragments;
 pub use write::{Compression, TraceWriter, WriteOptions, Written};

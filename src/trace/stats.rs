@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::Result;
 use crate::tile::{TILE_PIXELS, TileGrid, TileMap};
 use crate::trace::read::Trace;
+use crate::trace::ties::tied_fragments;
 
 /// Objects beyond this many are counted as one remainder.
 const MAX_OBJECTS: usize = 1 << 16;
@@ -28,6 +29,10 @@ pub struct Statistics {
     pub depth_complexity: Distribution,
     /// Fragments that cover a sample, on average over the samples of the covered pixels.
     pub layers: f64,
+    /// How many fragments share a depth with another one at a sample that both cover
+    /// ([`tied_fragments`]): designs that tell fragments apart by their depths see them at
+    /// one place.
+    pub tied_fragments: u64,
     /// Alphas.
     pub alpha: AlphaStatistics,
     /// Nearest and furthest depth at a pixel centre, as shares of the depth range.
@@ -111,8 +116,9 @@ impl Distribution {
     }
 }
 
-/// Reads a trace once and counts. `progress` is told the fragments of each
-/// batch. Memory is bounded by the touched tiles.
+/// Reads a trace and counts. `progress` is told the fragments of each batch of the first
+/// reading, after which [`tied_fragments`] reads it again. Memory is bounded by the touched
+/// tiles and by what that holds at a time.
 ///
 /// # Errors
 /// As [`Trace::batch`].
@@ -204,6 +210,7 @@ pub fn statistics(trace: &Trace, mut progress: impl FnMut(u64)) -> Result<Statis
         } else {
             covered_samples as f64 / (covered_pixels as f64 * f64::from(samples))
         },
+        tied_fragments: tied_fragments(trace, samples)?,
         alpha,
         depth: depth.map(|d| d.map(share)),
         objects: Objects { count: objects.len(), more, largest },

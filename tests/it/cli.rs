@@ -154,7 +154,8 @@ fn several_seeds_tell_variance_from_bias() {
     assert_eq!(errors["seeds"], 8);
     assert!(errors["variance"].as_f64().unwrap() > 1.0);
     assert!(
-        errors["bias_squared"].as_f64().unwrap().abs() < errors["variance"].as_f64().unwrap() / 4.0
+        errors["bias_squared"]["value"].as_f64().unwrap().abs()
+            < errors["variance"].as_f64().unwrap() / 4.0
     );
     let rmse = &errors["rmse"];
     assert!(rmse["low"].as_f64() < rmse["value"].as_f64());

@@ -94,7 +94,9 @@ fn record(design: &str, rmse: f64) -> Record {
     let record = serde_json::json!({
         "id": format!("glass.8.{design}"), "scene": "glass", "trace": "é|,\"\n", "series": design,
         "design": design, "family": "stochastic", "samples": 8, "seeds": 8,
-        "promises": {"unbiased": true, "consistent": true, "any_order": true, "seeded": false},
+        "promises": {"unbiased": "distinct-depths", "consistent": "always", "same_picture": true,
+            "same_expectation": "always", "seeded": false},
+        "tied_fragments": 3,
         "fragments": (1_u64 << 53) + 1, "frame": region, "covered": region, "interior": region,
         "edges": region, "fine": e, "filtered": [{"sigma": 1.0, "rmse": e}], "flip": null,
         "flip_hdr": {"mean": e, "quartiles": [e, e, e]},
@@ -139,7 +141,7 @@ for row, record in zip(rows, records):
         seen += 1
     derived = {name for name, value in row.items() if value is not None} - set(own)
     assert derived == set("""state_bytes bytes_moved_per_fragment hashes_per_fragment
-        comparators_per_fragment bias nanoseconds_per_fragment.fast.low
+        comparators_per_fragment tied_share unbiased_here nanoseconds_per_fragment.fast.low
         nanoseconds_per_fragment.fast.median nanoseconds_per_fragment.fast.high""".split()), derived
 print(seen)
 "#;

@@ -1,5 +1,6 @@
 //! What several tests share.
 
+use std::collections::{HashMap, VecDeque};
 use std::io::Write;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -174,6 +175,19 @@ pub fn not_bare(picture: &Picture, background: [f32; 3]) -> Vec<(u32, u32, [f64;
     bare.map(|(x, y)| (x, y, picture.get(x, y)))
         .filter(|(_, _, colour)| bits(*colour) != bits(background.map(f64::from)))
         .collect()
+}
+
+/// The fragments of `order`, which holds those of `api` in another order, with those of a
+/// pixel that share a plane in the sequence that they have in `api`: of these the last lies
+/// in front in the exact picture, too.
+pub fn in_sequence_at_equal_depths(api: &[Fragment], order: Vec<Fragment>) -> Vec<Fragment> {
+    let place = |f: &Fragment| (f.x, f.y, f.depth.z.0, f.depth.dzdx, f.depth.dzdy);
+    let mut waiting: HashMap<_, VecDeque<Fragment>> = HashMap::new();
+    for f in api {
+        waiting.entry(place(f)).or_default().push_back(*f);
+    }
+    let next = |f: Fragment| waiting.get_mut(&place(&f)).and_then(VecDeque::pop_front);
+    order.into_iter().filter_map(next).collect()
 }
 
 /// The GPU, opened once. Where there is none, the tests that ask for it are skipped, and

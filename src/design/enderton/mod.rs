@@ -13,8 +13,8 @@ use crate::rop::fast::{Count, FastEngine, Width};
 use crate::rop::stochastic::{self, COMBINATIONS, METHOD, OPAQUE, ROUNDS, STRATA};
 use crate::rop::{
     Blueprint, Declaration, Dither, Engine, Family, Frame, Info, OnDevice, OpaquePromise,
-    OrderPromise, PixelOrder, PixelWords, Port, Probe, Promises, Reference, ReferenceKey, Round,
-    Sampler, Site, Stochastic, Threshold, depth_bits, random_subset,
+    OrderPromise, PixelOrder, PixelWords, Port, Probe, Promise, Promises, Reference, ReferenceKey,
+    Round, Sampler, Site, Stochastic, Threshold, depth_bits, random_subset,
 };
 use crate::tile::TileGrid;
 use crate::trace::{Fragment, MAX_SAMPLES, SampleMask, Unorm32};
@@ -114,14 +114,20 @@ impl Blueprint for Enderton {
             || values.choice::<Among>("among") == Among::Covered
             || stochastic::strata_over_rounds(values);
         let apart = depth_bits::tells_apart(values);
-        // One object's surfaces share their masks; a table's alphas are rounded.
-        let own_masks = values.choice::<SeedBy>("seed-by") != SeedBy::Object;
+        // One object's surfaces share their masks, and so do fragments of one depth; a
+        // table's alphas are rounded.
+        let own_masks = match values.choice::<SeedBy>("seed-by") {
+            SeedBy::Primitive => Promise::Always,
+            SeedBy::Depth => Promise::DistinctDepths,
+            SeedBy::Object => Promise::Never,
+        };
         let basic = Promises {
-            unbiased: apart && own_masks && mask != MaskRule::Table,
+            unbiased: Promise::always_if(apart && mask != MaskRule::Table).min(own_masks),
             // As far as the most samples that a pixel can have tell.
-            consistent: apart
-                && own_masks
-                && (mask != MaskRule::Table || values.integer("alpha-bits") >= 8),
+            consistent: Promise::always_if(
+                apart && (mask != MaskRule::Table || values.integer("alpha-bits") >= 8),
+            )
+            .min(own_masks),
             order: match apart && of_itself {
                 true => OrderPromise::Independent,
                 false => OrderPromise::Dependent,

@@ -12,7 +12,7 @@ use crate::param::Values;
 use crate::rop::fast::{Count, Width};
 use crate::rop::{
     Blueprint, Contents, Design, Engine, Family, Frame, Info, OpaquePromise, OrderPromise, Probe,
-    Promises, Site, StateBits,
+    Promise, Promises, Site, StateBits,
 };
 use crate::trace::{DepthPlane, Fragment, SampleMask};
 
@@ -49,8 +49,8 @@ impl Blueprint for Exact {
 
     fn promises(_: &Values) -> Promises {
         Promises {
-            unbiased: true,
-            consistent: true,
+            unbiased: Promise::Always,
+            consistent: Promise::Always,
             order: OrderPromise::Independent,
             exact_opaque: OpaquePromise::Always,
             seeded: false,

@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use crate::metrics::Estimate;
 use crate::report::chart::labels::{Wanted, column, place};
 use crate::report::chart::{Kind, Scale, Style, px};
-use crate::study::record::Promised;
+use crate::study::record::Kept;
 use crate::study::throughput::Spread;
 
 /// An axis.
@@ -43,8 +43,8 @@ pub struct Curve {
     pub series: String,
     /// How it looks.
     pub style: Style,
-    /// What readers may filter by: its promises, and the most passes.
-    pub facts: Option<(Promised, u32)>,
+    /// What readers may filter by: the promises that it keeps, and the most passes.
+    pub facts: Option<(Kept, u32)>,
     /// Its points, in the order in which they are joined.
     pub marks: Vec<Mark>,
 }
@@ -189,11 +189,12 @@ impl Plot {
         let place = |m: &Mark| format!("{},{}", px(x.at(m.cost.median)), px(y.at(m.error.value)));
         let line: Vec<String> = curve.marks.iter().map(place).collect();
         let yes = |holds: bool| holds.then_some("");
-        let promised = curve.facts.map(|(p, _)| p);
+        let kept = curve.facts.map(|(kept, _)| kept);
         html! {
             g class=(format!("curve {}", curve.style.class)) data-series=(curve.series)
-                data-unbiased=[promised.and_then(|p| yes(p.unbiased))]
-                data-any-order=[promised.and_then(|p| yes(p.any_order))]
+                data-unbiased=[kept.and_then(|k| yes(k.unbiased))]
+                data-same-expectation=[kept.and_then(|k| yes(k.same_expectation))]
+                data-same-picture=[kept.and_then(|k| yes(k.same_picture))]
                 data-one-pass=[curve.facts.and_then(|(_, passes)| yes(passes <= 1))] {
                 @if line.len() > 1 {
                     polyline class="join" data-id=[self.whole(curve)] points=(line.join(" ")) {}

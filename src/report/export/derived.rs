@@ -33,7 +33,8 @@ pub static DERIVED: &[Derived] = &[
         unit: "comparisons per fragment",
         of: |r| Tree::of(&r.comparators_per_fragment()),
     },
-    Derived { name: "bias", unit: "1/255", of: |r| Tree::of(&r.bias()) },
+    Derived { name: "tied_share", unit: "0 to 1", of: |r| Tree::of(&r.tied_share()) },
+    Derived { name: "unbiased_here", unit: "", of: |r| Tree::of(&r.kept().unbiased) },
     Derived { name: "nanoseconds_per_fragment", unit: "ns per fragment", of: nanoseconds },
 ];
 

@@ -17,7 +17,7 @@ pub fn markdown(results: &Results) -> String {
     let how = format!(
         "{} from {}, where a seed changes anything. Errors are over the covered pixels, against \
          the exact picture of the same samples, on linear values in units of 1/255, ± half of \
-         the 95 % interval. Everything but times is the same on every machine.",
+         the 95 % interval; the mean error is picture minus exact picture, with its sign. Everything but times is the same on every machine.",
         counted(study.seeds as usize, "seed"),
         study.first_seed
     );
@@ -50,7 +50,7 @@ type Figure = fn(&Record) -> Option<String>;
 /// The columns between the design and the times.
 const COLUMNS: &[(&str, Figure)] = &[
     ("RMSE", |r| with_error(r.covered.rmse)),
-    ("bias", |r| r.bias().map(figures)),
+    ("mean error", |r| with_error(r.covered.mean).filter(|_| !r.is_one_draw())),
     ("FLIP", |r| with_error(r.flip?.mean)),
     ("RMSE after Gaussian of 1 pixel", |r| filtered(r, 1.0)),
     ("of 2 pixels", |r| filtered(r, 2.0)),

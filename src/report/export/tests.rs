@@ -72,7 +72,9 @@ fn csv_has_every_value_and_no_other() {
         let time = r.nanoseconds_per_fragment("fast").map(|s| s.median);
         assert_eq!(row["nanoseconds_per_fragment.fast.median"], absent(time));
         assert_eq!(row["state_bytes"], absent(r.state_bytes()));
-        assert_eq!(row["bias"], absent(r.bias()));
+        assert_eq!(row["covered.mean.value"].parse(), Ok(r.covered.mean.value));
+        assert_eq!(row["tied_share"], absent(r.tied_share()));
+        assert_eq!(row["unbiased_here"].parse(), Ok(r.kept().unbiased));
     }
 }
 

@@ -4,8 +4,9 @@ use maud::{Markup, html};
 
 use crate::param::Options;
 use crate::report::html::page::{Place, given_within};
-use crate::report::html::parts::{Cell, Content, command, figure, table};
+use crate::report::html::parts::{Cell, Content, command, figure, rounded, table};
 use crate::report::html::words::{figures, fixed, grouped, quoted};
+use crate::rop::Promise;
 use crate::study::analysis::{Cost, ROUNDING, baseline};
 
 pub(super) fn designs(content: &Content<'_>) -> Markup {
@@ -44,10 +45,11 @@ fn promises(told: Option<&[String]>, record: Option<&crate::study::record::Recor
             let list = [
                 (p.unbiased, "unbiased"),
                 (p.consistent, "consistent"),
-                (p.any_order, "any order of fragments"),
-                (!p.seeded, "the same for every seed"),
+                (Promise::always_if(p.same_picture), "the same picture in any order"),
+                (p.same_expectation, "the same mean in any order"),
+                (Promise::always_if(!p.seeded), "the same for every seed"),
             ];
-            words.extend(list.iter().filter(|(holds, _)| *holds).map(|(_, w)| w.to_string()));
+            words.extend(list.iter().filter_map(|(promise, what)| promise.words(what)));
         }
         (_, None) => words.push("no results".into()),
     }
@@ -66,6 +68,7 @@ pub(super) fn scenes(content: &Content<'_>) -> Markup {
         "most",
         "mean alpha",
         "opaque, %",
+        "at equal depths, %",
         "samples",
     ];
     let count = |n: u64| Cell::Number(n as f64, grouped(n));
@@ -76,7 +79,8 @@ pub(super) fn scenes(content: &Content<'_>) -> Markup {
             return cells;
         };
         let t = &s.statistics;
-        let opaque = 100.0 * t.alpha.opaque as f64 / t.fragments.max(1) as f64;
+        let percent = |n: u64| 100.0 * n as f64 / t.fragments.max(1) as f64;
+        let (opaque, tied) = (percent(t.alpha.opaque), percent(t.tied_fragments));
         cells.extend([
             Cell::text(&s.source),
             Cell::text(format!("{} × {}", s.size[0], s.size[1])),
@@ -87,6 +91,7 @@ pub(super) fn scenes(content: &Content<'_>) -> Markup {
             count(u64::from(t.depth_complexity.max)),
             Cell::Number(t.alpha.mean, fixed(t.alpha.mean, 2)),
             Cell::Number(opaque, fixed(opaque, 0)),
+            Cell::Number(tied, rounded(tied, 1)),
             count(u64::from(s.samples)),
         ]);
         cells
@@ -97,7 +102,9 @@ pub(super) fn scenes(content: &Content<'_>) -> Markup {
     };
     html! {
         (figure("scene-facts", &table(&header, &content.scenes().map(row).collect::<Vec<_>>()),
-            &html! { "The traces in numbers. Mean alpha is over fragments; opaque fragments have an alpha of 1." },
+            &html! { "The traces in numbers. Mean alpha is over fragments; opaque fragments have an alpha of 1. At equal \
+            depths lie fragments that share a depth with another one at a sample that both cover: where there \
+            are any, promises for differing depths are not kept." },
             &again))
         details {
             summary { "Cameras" }
@@ -144,7 +151,22 @@ pub(super) fn method(content: &Content<'_>) -> Markup {
                 dd {
                     "Per pixel over the seeds, averaged over covered pixels. The squared bias is the square \
                      of the mean error less a share of the variance, so that it is 0 on average for an \
-                     unbiased design and can be negative."
+                     unbiased design and can be negative; its interval is that of products of seeds two by \
+                     two, which needs four seeds."
+                }
+                dt { "Mean error" }
+                dd {
+                    "Mean over covered pixels and channels of picture minus exact picture, with its sign. Of \
+                     a design that seeds change its 95 % interval over the seeds holds 0 where no bias of \
+                     this kind shows; of others it is a figure without an interval. Biases of both signs in \
+                     different pixels cancel in it and not in the squared bias."
+                }
+                dt { "Promises" }
+                dd {
+                    "Unbiased: the expectation over seeds is the exact picture. The same picture in any order \
+                     of fragments, but for rounding, those of equal depth staying in sequence; the same mean \
+                     in any order says that of the expectation alone, and noise may differ. Where depths \
+                     differ: where no two fragments share a depth at a sample that both cover."
                 }
                 dt { "FLIP" }
                 dd {

@@ -21,7 +21,8 @@ pub(super) fn central(content: &Content<'_>) -> Markup {
             fieldset class="filters" {
                 legend { "Show only designs that are" }
                 label { input type="checkbox" data-filter="unbiased"; " unbiased" }
-                label { input type="checkbox" data-filter="any-order"; " any order of fragments" }
+                label { input type="checkbox" data-filter="same-expectation"; " of the same mean in any order" }
+                label { input type="checkbox" data-filter="same-picture"; " of the same picture in any order" }
                 label { input type="checkbox" data-filter="one-pass"; " done in one pass" }
             }
             (figure("central", &html! { (tabs("Cost", &panels)) (content.legend(|_| true)) }, &html! {
@@ -29,7 +30,10 @@ pub(super) fn central(content: &Content<'_>) -> Markup {
                  share of that of " code { (on.series) } " at " (on.samples) " samples. Bars are 95 % \
                  intervals, of both sides of the share; lines join the sample counts of a design. The \
                  step line is the Pareto front: nothing shown has less of one and no more of the other. \
-                 Each picture is held against the exact one of the same samples."
+                 Each picture is held against the exact one of the same samples. A filter counts what a \
+                 design promises and keeps on all scenes: what it promises where depths differ it does not \
+                 keep where fragments share them. The same mean over seeds in any order of fragments does \
+                 not say that the noise about it is the same."
             }, &html! { (content.study_command()) (content.replay_one()) }))
         }
     }
@@ -82,7 +86,7 @@ fn plot(content: &Content<'_>, all: &Points<'_>, cost: Cost, y: Axis) -> Plot {
             Some(Curve {
                 series: series.clone(),
                 style: content.styles.of(series),
-                facts: Some((first.promises, passes)),
+                facts: Some((first.kept, passes)),
                 marks: own.iter().map(|p| mark(p, cost)).collect(),
             })
         })

@@ -57,9 +57,11 @@ fn passes(c: &Candidate<'_>) -> String {
 
 /// What the choice gives up, as the end of a sentence.
 fn price(c: &Candidate<'_>) -> String {
+    let k = c.kept;
     let lacks = [
-        (!c.promises.unbiased, "it is biased"),
-        (!c.promises.any_order, "its picture depends on the order of fragments"),
+        (!k.unbiased, "it is biased"),
+        (!k.same_expectation, "its picture depends on the order of fragments, its mean too"),
+        (k.same_expectation && !k.same_picture, "its noise depends on the order of fragments"),
     ];
     let said: Vec<String> =
         lacks.iter().filter(|(holds, _)| *holds).map(|(_, what)| what.to_string()).collect();
@@ -80,7 +82,7 @@ pub(super) fn lead(content: &Content<'_>, answers: &[Answer<'_>]) -> Vec<String>
         (
             Need::All,
             Budget::Bounded,
-            "Of those that are unbiased, take fragments in any order and need one pass",
+            "Of those that are unbiased, have the same mean in any order of fragments and need one pass",
         ),
         (Need::All, Budget::Bytes(64), "Of the same within 64 bytes per pixel"),
     ];

@@ -2,10 +2,11 @@
 
 use maud::{Markup, html};
 
+use crate::metrics::Estimate;
 use crate::report::chart::{Bar, Kind, Row, Rows, Segment, swatch};
 use crate::report::html::choice::share_cell;
 use crate::report::html::parts::{Cell, Content, figure, nothing, table};
-use crate::report::html::words::{figures, fixed};
+use crate::report::html::words::{estimated, figures, fixed};
 use crate::study::analysis::baseline;
 use crate::study::record::Record;
 
@@ -29,14 +30,15 @@ pub(super) fn section(content: &Content<'_>) -> Markup {
             "Mean square error over covered pixels, split. " (swatch("variance"))
             " Variance is noise, which more seeds or frames average away; " (swatch("bias"))
             " squared bias is not. The bias is estimated without bias of its own, so it scatters \
-             around 0: what falls below is drawn as nothing. A design that no seed changes has its \
-             whole error as bias."
+             around 0, and what falls below is drawn as nothing: pointing at it gives the estimate with \
+             its sign and its 95 % interval. A design that no seed changes has its whole error as bias."
         }, &again()))
         details {
             summary { "All errors at " (content.count) " samples" }
             (figure("errors", &content.by_scene(|scene| all_errors(content, scene)), &html! {
                 "8-bit units. Covered: pixels with at least one fragment; interior: those that no \
-                 primitive's edge crosses; edges: the others. Fine: against the exact picture of all \
+                 primitive's edge crosses; edges: the others. Mean error: picture minus exact picture, \
+                 with its sign and, where seeds change the picture, its 95 % interval. Fine: against the exact picture of all \
                  the trace's samples, so that missing antialiasing counts."
             }, &again()))
         }
@@ -71,11 +73,14 @@ fn rmse(content: &Content<'_>, scene: &str) -> Markup {
 }
 
 /// Variance and squared bias; all of the error is bias where seeds change nothing.
-fn parts(record: &Record) -> Option<(f64, f64)> {
+fn parts(record: &Record) -> Option<(f64, Estimate)> {
     let e = &record.covered;
     match (e.variance, e.bias_squared) {
         (Some(variance), Some(bias)) => Some((variance, bias)),
-        _ => (!record.promises.seeded).then_some((0.0, e.rmse.value * e.rmse.value)),
+        _ => (!record.promises.seeded).then(|| {
+            let value = e.rmse.value * e.rmse.value;
+            (0.0, Estimate { value, low: value, high: value })
+        }),
     }
 }
 
@@ -86,16 +91,16 @@ fn bias(content: &Content<'_>, scene: &str) -> Markup {
         .map(|series| {
             let record = content.at_count(scene, series);
             let split = record.and_then(parts);
-            let segment = |value: f64, measure: &'static str, name: &str| Segment {
+            let segment = |value: f64, measure: &'static str, says: String| Segment {
                 value,
                 measure: measure.to_string(),
                 class: measure,
-                says: format!("{series}\n{name} {}", figures(value)),
+                says: format!("{series}\n{says}"),
             };
             let bars = split.map(|(variance, bias)| {
                 Bar::Stack(vec![
-                    segment(variance, "variance", "variance"),
-                    segment(bias, "bias", "squared bias"),
+                    segment(variance, "variance", format!("variance {}", figures(variance))),
+                    segment(bias.value, "bias", format!("squared bias {}", estimated(bias))),
                 ])
             });
             Row {
@@ -117,10 +122,27 @@ fn bias(content: &Content<'_>, scene: &str) -> Markup {
     rows.draw().unwrap_or_else(|| nothing("No design's error could be split here."))
 }
 
+/// The signed mean error over the covered pixels: with its interval over seeds, or without
+/// where no seed changes it. One draw of many tells nothing of the mean.
+fn mean_error(r: &Record) -> Cell {
+    let known = (!r.is_one_draw()).then_some(r.covered.mean);
+    Cell::estimate(known, 3, "one seed")
+}
+
 fn all_errors(content: &Content<'_>, scene: &str) -> Markup {
     let header = [
-        "design", "RMSE", "sRGB", "interior", "edges", "frame", "fine", "mean", "max", "variance",
-        "bias", "seeds",
+        "design",
+        "RMSE",
+        "mean error",
+        "sRGB",
+        "interior",
+        "edges",
+        "frame",
+        "fine",
+        "max",
+        "variance",
+        "squared bias",
+        "seeds",
     ];
     let optional = |v: Option<f64>| v.map_or(Cell::Missing("one seed".into()), Cell::number);
     let row = |series: &String| -> Vec<Cell> {
@@ -132,15 +154,15 @@ fn all_errors(content: &Content<'_>, scene: &str) -> Markup {
         let known = |e| Cell::Estimate(e, 2);
         cells.extend([
             known(r.covered.rmse),
+            mean_error(r),
             known(r.covered.rmse_srgb),
             known(r.interior.rmse),
             known(r.edges.rmse),
             known(r.frame.rmse),
             known(r.fine),
-            Cell::Estimate(r.covered.mean, 3),
             Cell::Number(r.covered.max, fixed(r.covered.max, 1)),
             optional(r.covered.variance),
-            optional(r.bias()),
+            Cell::estimate(parts(r).map(|(_, bias)| bias), 3, "one seed"),
             Cell::Number(f64::from(r.seeds), r.seeds.to_string()),
         ]);
         cells

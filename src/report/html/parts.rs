@@ -179,13 +179,19 @@ impl Cell {
                 td class="n" data-v=(e.value) data-low=(e.low) data-high=(e.high) {
                     (shown(*e, *decimals))
                     @if e.low != e.high {
-                        " " span class="pm" { "±" (fixed(e.half_width(), *decimals)) }
+                        " " span class="pm" { "±" (half_width(*e, *decimals)) }
                     }
                 }
             },
             Cell::Missing(why) => html! { td class="n none" title=(why) { "—" } },
         }
     }
+}
+
+/// Half of an interval's width; too few runs bound nothing.
+fn half_width(e: Estimate, decimals: usize) -> String {
+    let half = e.half_width();
+    if half.is_finite() { fixed(half, decimals) } else { "∞".into() }
 }
 
 /// An estimate's value; one that cannot be told from 0 has no more decimals than others.
@@ -195,7 +201,7 @@ fn shown(e: Estimate, decimals: usize) -> String {
 }
 
 /// A value with so many decimals; with more where it would round to 0 and is not.
-fn rounded(v: f64, decimals: usize) -> String {
+pub(super) fn rounded(v: f64, decimals: usize) -> String {
     let vanishes = v.abs() < 0.5 * 0.1_f64.powi(decimals as i32);
     if vanishes { figures(v) } else { fixed(v, decimals) }
 }

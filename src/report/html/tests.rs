@@ -86,7 +86,7 @@ fn measured(r: &Record, measure: &str) -> Option<f64> {
         "filtered-1" => Some(r.filtered.get(1)?.rmse.value),
         "filtered-2" => Some(r.filtered.get(2)?.rmse.value),
         "variance" => Some(r.covered.variance.unwrap_or(0.0)),
-        "bias" => Some(r.covered.bias_squared.unwrap_or(square)),
+        "bias" => Some(r.covered.bias_squared.map_or(square, |b| b.value)),
         "fragments-per-second-fast" => per_second("fast"),
         "fragments-per-second-gpu" => per_second("gpu"),
         _ => None,

@@ -32,12 +32,13 @@ fn preamble(text: &mut String, c: &Comparison) {
          Every design of the registry with its defaults, and with each of its methods, at n \
          samples per pixel and, where it keeps layers, n layers (`slab`: 2n coverage bits, as in \
          Wyman's figure 1); {} × {} pixels, {} seeds of what is random. RMSE over the covered \
-         pixels against the exact picture of the same samples, in 8-bit units, and in brackets its \
-         bias: the root mean square of the pixels' mean errors, which no number of seeds or \
-         frames averages away (0 for what is unbiased; estimated, so that small values are \
-         noise). *State*: bytes per pixel in hardware, without a z-buffer for opaque geometry \
-         where the scene has none. *Passes* over the trace. Designs without noise have their whole \
-         error as bias.\n",
+         pixels against the exact picture of the same samples, in 8-bit units, and in brackets the \
+         mean error: picture minus exact picture over the covered pixels, with its sign, ± half of \
+         its 95 % interval over the seeds where seeds change anything. An interval without 0 shows \
+         a bias; errors of both signs cancel in the mean. *At equal depths*: the share of the \
+         fragments that meet another one of their depth at a sample, where promises for differing \
+         depths are not kept. *State*: bytes per pixel in hardware, without a z-buffer for opaque geometry \
+         where the scene has none. *Passes* over the trace.\n",
         c.side, c.side, c.seeds
     );
     let rows: Vec<Vec<String>> = c
@@ -45,6 +46,7 @@ fn preamble(text: &mut String, c: &Comparison) {
         .iter()
         .map(|s| {
             let t = &s.statistics;
+            let percent = |n: u64| format!("{:.0} %", 100.0 * n as f64 / t.fragments.max(1) as f64);
             vec![
                 s.name.to_string(),
                 format!("{:.2} M", t.fragments as f64 / 1e6),
@@ -52,12 +54,21 @@ fn preamble(text: &mut String, c: &Comparison) {
                 t.depth_complexity.p95.to_string(),
                 t.depth_complexity.max.to_string(),
                 format!("{:.2}", t.alpha.mean),
-                format!("{:.0} %", 100.0 * t.alpha.opaque as f64 / t.fragments.max(1) as f64),
+                percent(t.alpha.opaque),
+                percent(t.tied_fragments),
             ]
         })
         .collect();
-    let header =
-        ["scene", "fragments", "per covered pixel", "95 %", "most", "mean alpha", "opaque"];
+    let header = [
+        "scene",
+        "fragments",
+        "per covered pixel",
+        "95 %",
+        "most",
+        "mean alpha",
+        "opaque",
+        "at equal depths",
+    ];
     text.push_str(&markdown_table(&header, &rows));
     for missing in &c.missing {
         let _ = writeln!(text, "\n`{missing}` was not given and is left out.");
@@ -103,7 +114,12 @@ fn table(text: &mut String, c: &Comparison, count: u32) {
 }
 
 fn cell(r: &Outcome) -> String {
-    format!("{:.1} ({:.1})", r.errors.rmse.value, r.bias())
+    let (rmse, mean) = (r.errors.rmse.value, r.errors.mean);
+    let half = match mean.half_width() {
+        0.0 => String::new(),
+        half => format!(" ± {half:.2}"),
+    };
+    format!("{rmse:.1} ({:+.2}{half})", mean.value)
 }
 
 /// The geometric mean over the scenes of the ratio of two contenders' errors.

@@ -6,8 +6,9 @@ use std::fmt::Write;
 use crate::param::Options;
 use crate::report::markdown_table;
 use crate::report::stability::{in_cell, short};
+use crate::rop::Promise;
 use crate::study::stress::{
-    DECIDED, Facts, Finding, Group, HEAVY_SEEDS, Outcome, SIGNIFICANCE, Series, Stability,
+    DECIDED, Facts, Finding, Group, HEAVY_SEEDS, Outcome, SIGNIFICANCE, Series, Stability, Tally,
 };
 
 pub(super) fn text(text: &mut String, found: &Stability) {
@@ -26,6 +27,13 @@ pub(super) fn text(text: &mut String, found: &Stability) {
         found.cases.len(),
         found.findings.len(),
     );
+    let tied = found.cases.iter().filter(|c| c.tied_fragments > 0).count();
+    let conditional: Vec<String> = found
+        .series
+        .iter()
+        .filter(|s| s.unbiased == Promise::DistinctDepths)
+        .map(|s| format!("`{}`", s.name))
+        .collect();
     let _ = writeln!(
         text,
         "The truth is composited sample by sample in double precision with compensated sums. An \
@@ -43,8 +51,13 @@ pub(super) fn text(text: &mut String, found: &Stability) {
          Designs that are random are measured over {} seeds ({} at most where a case has more than \
          2^17 fragments); their bounds are crossed by chance alone anywhere in the table with a \
          probability of {} (Student's t, Bonferroni). What is promised to be unbiased and is off is \
-         a broken promise, and so is an engine that differs.\n",
-        DECIDED, found.seeds, HEAVY_SEEDS, SIGNIFICANCE
+         a broken promise, and so is an engine that differs. {tied} cases have fragments that share \
+         a depth at a sample: what is promised where depths differ ({}) may be off there.\n",
+        DECIDED,
+        found.seeds,
+        HEAVY_SEEDS,
+        SIGNIFICANCE,
+        if conditional.is_empty() { "of none here".to_string() } else { conditional.join(", ") },
     );
     engines(text, found);
     summary(text, found);
@@ -85,10 +98,8 @@ fn summary(text: &mut String, found: &Stability) {
         Group::ALL.iter().copied().filter(|g| found.cases.iter().any(|c| c.group == *g)).collect();
     let right = |series: &Series, group: Group| {
         let cases = found.cases.iter().filter(|c| c.group == group);
-        let findings: Vec<&Finding> =
-            cases.filter_map(|c| found.finding(&c.name, &series.name)).collect();
-        let fine = |f: &&&Finding| matches!(f.outcome, Outcome::Exact | Outcome::Within { .. });
-        format!("{} of {}", findings.iter().filter(fine).count(), findings.len())
+        let findings = cases.filter_map(|c| found.finding(&c.name, &series.name));
+        Tally::of(findings.map(|f| &f.outcome)).to_string()
     };
     let rows: Vec<Vec<String>> = found
         .series
@@ -101,7 +112,8 @@ fn summary(text: &mut String, found: &Stability) {
     let names = groups.iter().map(|g| Group::CHOICES[*g as usize].name);
     let head: Vec<&str> = std::iter::once("design").chain(names).collect();
     text.push_str(
-        "Cases in which a design is exact or within its bound, by what is hard about them:\n\n",
+        "Cases in which a design is exact or within its bound, by what is hard about them; undecided \
+         ones count as neither right nor wrong:\n\n",
     );
     text.push_str(&markdown_table(&head, &rows));
     text.push('\n');

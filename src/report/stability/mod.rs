@@ -72,6 +72,7 @@ fn in_cell(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::rop::Promise;
     use crate::study::stress::{Agreement, Claim, Facts, Fault, Finding, Outcome, Series, cases};
 
     #[test]
@@ -81,7 +82,7 @@ mod tests {
     }
 
     fn made_up(outcome: Outcome, broken: Option<&str>) -> Stability {
-        let case: Facts = cases()[0].facts();
+        let case: Facts = cases()[0].facts(0);
         let finding = Finding {
             case: case.name.clone(),
             design: "lk".to_string(),
@@ -93,7 +94,7 @@ mod tests {
             }],
             broken: broken.map(str::to_string),
         };
-        let lk = Series { name: "lk".to_string(), unbiased: false, seeded: true };
+        let lk = Series { name: "lk".to_string(), unbiased: Promise::Never, seeded: true };
         Stability {
             seeds: 2,
             unfit: Vec::new(),

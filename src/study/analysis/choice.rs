@@ -2,10 +2,11 @@
 
 use crate::metrics::Estimate;
 use crate::study::analysis::cost::Cost;
+use crate::study::analysis::kept::kept;
 use crate::study::analysis::relative::{
     RunName, has_interval, ratio, records_over_scenes, relative,
 };
-use crate::study::record::Promised;
+use crate::study::record::Kept;
 use crate::study::results::Results;
 
 crate::options! {
@@ -13,9 +14,10 @@ crate::options! {
     pub enum Need {
         Any = "any design": "whatever it promises",
         Unbiased = "unbiased": "its expectation is the exact picture",
-        AnyOrder = "any order": "fragments may arrive in any order",
+        SameExpectation = "same mean in any order": "the order of fragments does not change its expectation",
+        SamePicture = "same picture in any order": "the order of fragments changes nothing but rounding",
         OnePass = "one pass": "the scene is drawn once",
-        All = "all three": "unbiased, any order of fragments, and one pass",
+        All = "all at once": "unbiased, the same mean in any order of fragments, and one pass",
     }
 }
 
@@ -47,8 +49,8 @@ pub struct Candidate<'a> {
     pub run: RunName<'a>,
     /// The design at this sample count.
     pub design: &'a str,
-    /// What it promises.
-    pub promises: Promised,
+    /// What it promises and keeps on all scenes.
+    pub kept: Kept,
     /// Error relative to the baseline over all scenes.
     pub error: Estimate,
     /// Bytes of state per pixel; `None` where it grows.
@@ -89,10 +91,11 @@ impl Need {
     fn met(self, c: &Candidate<'_>) -> bool {
         match self {
             Need::Any => true,
-            Need::Unbiased => c.promises.unbiased,
-            Need::AnyOrder => c.promises.any_order,
+            Need::Unbiased => c.kept.unbiased,
+            Need::SameExpectation => c.kept.same_expectation,
+            Need::SamePicture => c.kept.same_picture,
             Need::OnePass => c.passes <= 1,
-            Need::All => c.promises.unbiased && c.promises.any_order && c.passes <= 1,
+            Need::All => c.kept.unbiased && c.kept.same_expectation && c.passes <= 1,
         }
     }
 }
@@ -120,7 +123,7 @@ pub fn candidates(results: &Results) -> Vec<Candidate<'_>> {
         Some(Candidate {
             run,
             design: &first.design,
-            promises: first.promises,
+            kept: kept(results, run.series)?,
             error: relative(results, run).ok()?,
             state: Cost::State.over_scenes(results, run).ok().map(|s| s.median),
             passes: records.iter().map(|r| r.passes).max()?,
@@ -179,6 +182,8 @@ fn separation(results: &Results, best: RunName<'_>, second: RunName<'_>) -> Sepa
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::param::Options;
+    use crate::rop::Promise;
     use crate::study::analysis::made_up::{exactly, planted};
 
     fn near(value: f64) -> Estimate {
@@ -204,7 +209,7 @@ mod tests {
         );
         for r in &mut results.records {
             r.state_bits.samples = if r.series == "large" { 8 * 100 } else { 8 * 40 };
-            r.promises.unbiased = r.series == "base" || r.series == "same";
+            r.promises.unbiased = Promise::always_if(r.series == "base" || r.series == "same");
             r.state_bits.unbounded = r.series == "exact";
         }
         results
@@ -222,7 +227,28 @@ mod tests {
         assert_eq!(ask(&results, Need::Any, Budget::Any).0.as_deref(), Some("exact"));
         assert_eq!(ask(&results, Need::Any, Budget::Bytes(32)), (None, Separation::Alone));
         assert_eq!(ask(&results, Need::Unbiased, Budget::Any).0.as_deref(), Some("same"));
-        assert_eq!(answers(&results).len(), BUDGETS.len() * 5);
+        assert_eq!(answers(&results).len(), BUDGETS.len() * Need::ALL.len());
+    }
+
+    #[test]
+    fn a_promise_for_distinct_depths_counts_where_no_scene_has_equal_ones() {
+        let mut results =
+            planted(&["s", "t"], &[8], &[("base", &[near(4.0); 2]), ("by depth", &[near(2.0); 2])]);
+        for r in results.records.iter_mut().filter(|r| r.series == "by depth") {
+            r.promises.unbiased = Promise::DistinctDepths;
+            (r.promises.same_picture, r.promises.same_expectation) =
+                (false, Promise::DistinctDepths);
+        }
+        let needs = [Need::Unbiased, Need::SameExpectation, Need::SamePicture, Need::All];
+        let best = |results: &Results| {
+            needs.map(|need| ask(results, need, Budget::Bounded).0.unwrap_or_default())
+        };
+        assert_eq!(best(&results), ["by depth", "by depth", "base", "by depth"]);
+        // Equal depths on one of the scenes.
+        results.records[3].tied_fragments = 1;
+        assert_eq!(results.records[3].series, "by depth");
+        assert_eq!(best(&results), ["base"; 4]);
+        assert_eq!(ask(&results, Need::Any, Budget::Bounded).0.as_deref(), Some("by depth"));
     }
 
     #[test]

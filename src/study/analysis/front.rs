@@ -2,8 +2,9 @@
 
 use crate::metrics::Estimate;
 use crate::study::analysis::cost::Cost;
+use crate::study::analysis::kept::kept;
 use crate::study::analysis::relative::{RunName, relative};
-use crate::study::record::Promised;
+use crate::study::record::Kept;
 use crate::study::results::Results;
 use crate::study::throughput::Spread;
 
@@ -16,8 +17,8 @@ pub struct Point<'a> {
     pub id: Option<&'a str>,
     /// The design's family.
     pub family: &'a str,
-    /// What the design promises.
-    pub promises: Promised,
+    /// What the design promises and keeps on all scenes.
+    pub kept: Kept,
     /// Passes over the trace, on the scene that takes most.
     pub passes: u32,
     /// The cost.
@@ -85,9 +86,10 @@ fn point<'a>(
             (first.ok_or("no result")?, cost.over_scenes(results, run)?, error, passes)
         }
     };
-    let (family, promises) = (record.family.as_str(), record.promises);
+    let family = record.family.as_str();
+    let kept = kept(results, run.series).ok_or("no result")?;
     let id = scene.map(|_| record.id.as_str());
-    Ok(Point { run, id, family, promises, passes, cost, error, front: false })
+    Ok(Point { run, id, family, kept, passes, cost, error, front: false })
 }
 
 #[cfg(test)]

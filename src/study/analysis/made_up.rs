@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::metrics::{EnsembleErrors, Estimate, Temporal};
-use crate::rop::{EventCounts, StateBits};
+use crate::rop::{EventCounts, Promise, StateBits};
 use crate::study::file::{SceneEntry, Study};
 use crate::study::record::{Filtered, FlipOverSeeds, Promised, Record, SpectrumOverSeeds, Speed};
 use crate::study::results::{Machine, Missing, Results, SceneFacts};
@@ -79,6 +79,7 @@ fn facts(name: &str, place: usize) -> SceneFacts {
             histogram: vec![10, 20, 30, 40, 20, 10],
         },
         layers: fragments as f64 / 200_000.0,
+        tied_fragments: fragments / 50 * place as u64,
         alpha: AlphaStatistics {
             min: 0.1,
             mean: 0.37,
@@ -115,7 +116,7 @@ pub(crate) fn record(scene: &str, series: &str, samples: u32, rmse: Estimate) ->
         mean: Estimate { value: 0.001, low: -0.01, high: 0.012 },
         max: rmse.value * 8.0,
         variance: Some(rmse.value * rmse.value),
-        bias_squared: Some(0.0),
+        bias_squared: Some(exactly(0.0)),
         temporal: None,
     };
     Record {
@@ -125,10 +126,17 @@ pub(crate) fn record(scene: &str, series: &str, samples: u32, rmse: Estimate) ->
         series: series.into(),
         design,
         family: "stochastic".into(),
-        promises: Promised { unbiased: true, consistent: true, any_order: true, seeded: true },
+        promises: Promised {
+            unbiased: Promise::Always,
+            consistent: Promise::Always,
+            same_picture: true,
+            same_expectation: Promise::Always,
+            seeded: true,
+        },
         samples,
         seeds: 8,
         fragments: 1_000_000,
+        tied_fragments: 0,
         frame: errors.clone(),
         covered: errors.clone(),
         interior: errors.clone(),
@@ -232,15 +240,20 @@ fn plausible_record(scene: &str, place: usize, samples: u32, habit: &Habit) -> R
     r.id = format!("{scene}-{}-{samples}", r.design.replace([':', '=', ','], "_"));
     r.family = family.into();
     r.seeds = if seeded { 8 } else { 1 };
+    let in_order = matches!(name, "mlab:layers={n}" | "adaptive:layers={n}" | "blend");
     r.promises = Promised {
-        unbiased: bias == 0.0,
-        consistent: exponent > 0.0,
-        any_order: !matches!(name, "mlab:layers={n}" | "adaptive:layers={n}" | "blend"),
+        unbiased: Promise::always_if(bias == 0.0),
+        consistent: Promise::always_if(exponent > 0.0),
+        same_picture: !in_order && name != "lk:track=covered",
+        same_expectation: Promise::always_if(!in_order),
         seeded,
     };
     let square = value * value;
     r.covered.variance = seeded.then_some(square * (1.0 - bias * bias));
-    r.covered.bias_squared = seeded.then_some(square * bias * bias + 0.002 * square * scatter(2));
+    r.covered.bias_squared = seeded.then(|| {
+        let value = square * bias * bias + 0.002 * square * scatter(2);
+        Estimate { value, low: value - 0.003 * square, high: value + 0.003 * square }
+    });
     r.covered.temporal = seeded.then_some(Temporal {
         deviation_median: value * 0.6,
         deviation_p95: value * 1.9,

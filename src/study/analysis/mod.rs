@@ -8,6 +8,7 @@ mod choice;
 mod convergence;
 mod cost;
 mod front;
+mod kept;
 #[cfg(test)]
 pub(crate) mod made_up;
 mod relative;
@@ -18,6 +19,7 @@ pub use choice::{
 pub use convergence::convergence;
 pub use cost::Cost;
 pub use front::{Point, Points, front, points};
+pub use kept::kept;
 pub use relative::{
     ROUNDING, RunName, baseline, has_interval, ratio, ratio_on, records_over_scenes,
     reference_count, relative, relative_on,

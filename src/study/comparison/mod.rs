@@ -78,14 +78,6 @@ pub struct Outcome {
     pub errors: EnsembleErrors,
 }
 
-impl Outcome {
-    /// Root of the mean square of each pixel's mean error, in 8-bit units: what no
-    /// number of seeds removes.
-    pub fn bias(&self) -> f64 {
-        self.errors.bias_squared.map_or(self.errors.rmse.value, |b| b.max(0.0).sqrt())
-    }
-}
-
 /// One scene with the results of all contenders.
 #[derive(Clone, Debug, Serialize)]
 pub struct ComparedScene {

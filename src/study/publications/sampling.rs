@@ -7,7 +7,7 @@ use crate::design::configure;
 use crate::error::Result;
 use crate::metrics::{Ensemble, Estimate, PixelClasses};
 use crate::study::publications::{Effort, capture, replay};
-use crate::trace::Trace;
+use crate::trace::{Trace, tied_fragments};
 
 /// How many samples a far surface keeps under a near one, both α = 0.5 at 16
 /// samples.
@@ -69,6 +69,7 @@ pub(super) fn means(
     for samples in counts {
         let exact = replay("exact", trace, samples, 0)?.picture;
         let covered = PixelClasses::of(trace, samples)?.covered;
+        let tied = tied_fragments(trace, samples)?;
         for spec in MEAN_DESIGNS {
             progress(&format!("expectation of {spec} at {samples}"), list.len() as u64, total);
             let mut ensemble = Ensemble::new(&exact, &[&covered]);
@@ -80,7 +81,7 @@ pub(super) fn means(
             list.push(MeanError {
                 design: design.label(),
                 samples,
-                unbiased: design.promises().unbiased,
+                unbiased: design.promises().unbiased.holds(tied),
                 mean: e.mean,
                 rmse: e.rmse,
             });

@@ -12,10 +12,10 @@ use crate::metrics::{
 };
 use crate::param::Options;
 use crate::picture::Picture;
-use crate::rop::{EventCounts, OrderPromise, ReplayOptions, Replayed, StateBits, Which};
+use crate::rop::{EventCounts, ReplayOptions, Replayed, StateBits, Which};
 use crate::study::engine::{Engine, EngineName, OnGpu};
 use crate::study::file::{Metric, Study};
-use crate::study::record::{Filtered, FlipOverSeeds, Promised, Record, SpectrumOverSeeds, Speed};
+use crate::study::record::{Filtered, FlipOverSeeds, Record, SpectrumOverSeeds, Speed};
 use crate::study::run::scene::{OpenScene, Reference, Watch};
 use crate::study::run::tasks::Job;
 use crate::study::throughput::Spread;
@@ -55,16 +55,11 @@ pub(super) fn measure(
         series: job.series.clone(),
         design: design.label(),
         family: design.info().family.name().to_string(),
-        promises: Promised {
-            unbiased: promises.unbiased,
-            consistent: promises.consistent,
-            // What is unbiased has the exact picture as its mean, whatever the order.
-            any_order: promises.unbiased || promises.order != OrderPromise::Dependent,
-            seeded: promises.seeded,
-        },
+        promises: promises.into(),
         samples: job.samples,
         seeds,
         fragments: reference.fragments,
+        tied_fragments: reference.tied_fragments,
         frame,
         covered,
         interior,

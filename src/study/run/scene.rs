@@ -14,7 +14,7 @@ use crate::study::results::SceneFacts;
 use crate::study::run::store::Store;
 use crate::study::throughput::work;
 use crate::tile::{TILE_PIXELS, TileGrid, TileMap};
-use crate::trace::{Trace, TraceWriter, WriteOptions, statistics};
+use crate::trace::{Trace, TraceWriter, WriteOptions, statistics, tied_fragments};
 
 /// What runs are told of.
 pub type Watch<'a> = &'a (dyn Fn(&str) + Sync);
@@ -178,6 +178,8 @@ pub(super) struct Reference {
     pub classes: PixelClasses,
     /// Fragments that cover one of the samples.
     pub fragments: u64,
+    /// Those of them that share a depth with another at one of the samples.
+    pub tied_fragments: u64,
     /// Comparison to the picture as a viewer sees it, where it is asked for.
     pub flip: Option<Flip>,
 }
@@ -202,6 +204,12 @@ impl Reference {
             frame: Region::frame(picture.grid()),
             classes: PixelClasses::of(trace, samples)?,
             fragments: work(trace, samples)?.fragments,
+            // What no two share at all samples they do not at some.
+            tied_fragments: match scene.facts.statistics.tied_fragments {
+                0 => 0,
+                all if samples == trace.header().pattern.samples() => all,
+                _ => tied_fragments(trace, samples)?,
+            },
             flip: seen.then(|| Flip::new(&picture)),
             picture,
         })

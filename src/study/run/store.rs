@@ -354,5 +354,10 @@ pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<Option<T>> {
 }
 
 fn damaged(path: &Path, what: &str) -> Error {
-    Error::invalid(path.display(), what, "remove it to have it measured again")
+    Error::invalid(
+        path.display(),
+        what,
+        "remove it to have it measured again, or begin in another folder where another version \
+         of this program wrote this one",
+    )
 }

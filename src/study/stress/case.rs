@@ -113,8 +113,9 @@ impl Case {
         self.fragments() <= LIGHT
     }
 
-    /// What is known of it, for people and programs.
-    pub fn facts(&self) -> Facts {
+    /// What is known of it, for people and programs; how many fragments share a depth is
+    /// [`tied_fragments`](crate::trace::tied_fragments) of its trace.
+    pub fn facts(&self, tied_fragments: u64) -> Facts {
         Facts {
             group: self.group,
             name: self.name.clone(),
@@ -123,6 +124,7 @@ impl Case {
             size: self.size(),
             layers: self.kinds.iter().map(Vec::len).max().unwrap_or(0),
             fragments: self.fragments(),
+            tied_fragments,
             against: self.against,
         }
     }
@@ -182,6 +184,8 @@ pub struct Facts {
     pub layers: usize,
     /// Fragments of the trace.
     pub fragments: u64,
+    /// Those of them that share a depth with another one at a sample.
+    pub tied_fragments: u64,
     /// The case whose noise its own is held against.
     pub against: Option<&'static str>,
 }

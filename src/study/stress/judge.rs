@@ -78,12 +78,49 @@ impl Outcome {
         }
     }
 
+    /// Whether it is as close to the truth as the suite can tell.
+    fn is_right(&self) -> bool {
+        matches!(self, Outcome::Exact | Outcome::Within { .. })
+    }
+
     /// How many there are of each kind.
     pub fn count<'a>(all: impl IntoIterator<Item = &'a Outcome>) -> [usize; Self::KINDS.len()] {
         all.into_iter().fold(Default::default(), |mut counts, outcome| {
             counts[outcome.kind()] += 1;
             counts
         })
+    }
+}
+
+/// How many cases a design is right in, as tables have it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct Tally {
+    /// Cases that were tried.
+    pub cases: usize,
+    /// Those in which it is exact or within the stated bound.
+    pub right: usize,
+    /// Those whose bound is too wide to tell: neither right nor wrong.
+    pub undecided: usize,
+}
+
+impl Tally {
+    /// Of these outcomes.
+    pub fn of<'a>(all: impl IntoIterator<Item = &'a Outcome>) -> Self {
+        all.into_iter().fold(Tally::default(), |tally, outcome| Tally {
+            cases: tally.cases + 1,
+            right: tally.right + usize::from(outcome.is_right()),
+            undecided: tally.undecided + usize::from(matches!(outcome, Outcome::Undecided { .. })),
+        })
+    }
+}
+
+impl std::fmt::Display for Tally {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Tally { cases, right, undecided } = self;
+        match undecided {
+            0 => write!(f, "of {cases}: {right}"),
+            _ => write!(f, "of {cases}: {right}, {undecided} undecided"),
+        }
     }
 }
 
@@ -215,6 +252,27 @@ mod tests {
         Picture::from_fn(TileGrid::new(width, height), |x, y| {
             [0.5, 0.25, 0.0].map(|v| v * value(y * width + x))
         })
+    }
+
+    #[test]
+    fn what_is_undecided_is_neither_right_nor_wrong() {
+        let numbers = || (0.1, 0.2, 0.3);
+        let within = {
+            let (error, bound, noise) = numbers();
+            Outcome::Within { error, bound, noise }
+        };
+        let undecided = {
+            let (error, bound, noise) = numbers();
+            Outcome::Undecided { error, bound, noise }
+        };
+        let off = {
+            let (error, bound, noise) = numbers();
+            Outcome::Degraded { error, bound, noise }
+        };
+        let told = |list: &[&Outcome]| Tally::of(list.iter().copied()).to_string();
+        assert_eq!(told(&[&Outcome::Exact, &within, &off]), "of 3: 2");
+        assert_eq!(told(&[&Outcome::Exact, &undecided, &off]), "of 3: 1, 1 undecided");
+        assert_eq!(told(&[&Outcome::NotFinite { pixels: 1 }]), "of 1: 0");
     }
 
     #[test]

@@ -21,7 +21,7 @@ pub use cases::cases;
 pub use claims::{Claim, MOST_BYTES, MOST_SECONDS};
 pub use correlation::{Between, Correlation, CorrelationRow};
 pub use faults::Fault;
-pub use judge::{DECIDED, Outcome, SIGNIFICANCE};
+pub use judge::{DECIDED, Outcome, SIGNIFICANCE, Tally};
 pub use unfit::Unfit;
 
 use crate::design::{Configured, DESIGNS, configure};
@@ -29,10 +29,11 @@ use crate::error::Result;
 use crate::gpu::{Gpu, GpuOptions, TOLERANCE};
 use crate::param::Options;
 use crate::picture::Picture;
-use crate::rop::{ReplayOptions, Which};
+use crate::rop::stochastic::{METHOD, Method};
+use crate::rop::{Promise, ReplayOptions, Which};
 use crate::study::engine::EngineName;
 use crate::study::stress::judge::Judge;
-use crate::trace::Trace;
+use crate::trace::{Trace, tied_fragments};
 
 /// Seeds of cases with many fragments, at most.
 pub const HEAVY_SEEDS: u32 = 16;
@@ -50,6 +51,9 @@ const EXTREMES: [&str; 10] = [
     "wboit:weight=eq10",
     "mboit:moments=8",
 ];
+
+/// Designs that are tried with each of their methods of several passes, too.
+const SAMPLERS: [&str; 3] = ["lk", "systematic", "enderton"];
 
 /// What is tried.
 #[derive(Clone, Copy)]
@@ -94,8 +98,8 @@ pub struct Stability {
 pub struct Series {
     /// Its name with its settings.
     pub name: String,
-    /// Whether its mean is promised to be the truth.
-    pub unbiased: bool,
+    /// Where its mean is promised to be the truth.
+    pub unbiased: Promise,
     /// Whether it is random.
     pub seeded: bool,
 }
@@ -194,13 +198,13 @@ pub fn stress(plan: &Plan<'_>) -> Result<Stability> {
     let faults = plan.program.map_or(Ok(Vec::new()), |p| faults::faults(p, plan.gpu))?;
     let designs = designs()?;
     let cases = cases();
-    let findings = findings(plan, gpu.as_ref(), &designs, &cases)?;
+    let (facts, findings) = findings(plan, gpu.as_ref(), &designs, &cases)?;
     told("correlations");
     let random: Vec<Configured> = designs.iter().filter(|d| d.promises().seeded).cloned().collect();
     Ok(Stability {
         seeds: plan.seeds,
         unfit: unfit::unfit()?,
-        cases: cases.iter().map(Case::facts).collect(),
+        cases: facts,
         series: designs.iter().map(series).collect(),
         engines: engines(gpu.as_ref()),
         findings,
@@ -211,17 +215,17 @@ pub fn stress(plan: &Plan<'_>) -> Result<Stability> {
     })
 }
 
-/// What every design makes of every case.
+/// The cases, and what every design makes of each.
 fn findings(
     plan: &Plan<'_>,
     gpu: Option<&Gpu>,
     designs: &[Configured],
     cases: &[Case],
-) -> Result<Vec<Finding>> {
+) -> Result<(Vec<Facts>, Vec<Finding>)> {
     let seeded = designs.iter().filter(|d| d.promises().seeded).count();
     let tests = seeded * 3 * cases.iter().map(|c| c.kinds.len()).sum::<usize>();
     let total = cases.len() as u64;
-    let mut findings = Vec::new();
+    let (mut facts, mut findings) = (Vec::new(), Vec::new());
     for (i, case) in cases.iter().enumerate() {
         (plan.progress)(&case.name, i as u64, total);
         let trial = Trial {
@@ -230,6 +234,8 @@ fn findings(
             judge: Judge::new(case, tests)?,
             seeds: plan.seeds,
         };
+        let tied = tied_fragments(&trial.trace, case.samples)?;
+        facts.push(case.facts(tied));
         let found: Vec<(Finding, Result<Picture>)> =
             designs.par_iter().map(|d| trial.finding(d)).collect();
         // One after the other: there is one device.
@@ -237,16 +243,22 @@ fn findings(
             if let Some(gpu) = gpu.filter(|_| design.is_ported()) {
                 finding.engines.push(trial.on_gpu(gpu, design, &plain));
             }
-            finding.broken = broken(design, &finding);
+            let promised = trial.promised(design, tied)?;
+            finding.broken = broken(&promised, &finding);
             findings.push(finding);
         }
     }
-    Ok(findings)
+    Ok((facts, findings))
 }
 
 fn designs() -> Result<Vec<Configured>> {
     let defaults = DESIGNS.iter().map(|entry| entry.configure(&[]));
-    defaults.chain(EXTREMES.iter().map(|spec| configure(spec, &[]))).collect()
+    let methods = Method::CHOICES.iter().filter(|m| m.name != METHOD.default);
+    let of_several_passes = SAMPLERS.iter().flat_map(|sampler| {
+        methods.clone().map(move |m| format!("{sampler}:{}={}", METHOD.name, m.name))
+    });
+    let beside = EXTREMES.iter().map(|spec| spec.to_string()).chain(of_several_passes);
+    defaults.chain(beside.map(|spec| configure(&spec, &[]))).collect()
 }
 
 fn series(design: &Configured) -> Series {
@@ -317,6 +329,14 @@ impl Trial<'_> {
         }
     }
 
+    /// What a design promises where `tied` fragments share a depth.
+    fn promised(&self, design: &Configured, tied: u64) -> Result<OnCase> {
+        let frame = design.frame(&self.trace, self.case.samples, 0)?;
+        let passes = design.build(&frame, Which::Reference)?.passes();
+        let unbiased = design.promises().unbiased.holds(tied);
+        Ok(OnCase { unbiased, finite: unbiased && passes == 1 })
+    }
+
     fn on_gpu(&self, gpu: &Gpu, design: &Configured, plain: &Result<Picture>) -> Agreement {
         let options = GpuOptions::default();
         let replayed = design.replay_on(gpu, &self.trace, self.case.samples, 0, &options);
@@ -356,11 +376,22 @@ fn difference(a: &Picture, b: &Picture) -> f64 {
     most
 }
 
+/// What a design promises on a case.
+struct OnCase {
+    /// That its mean is the truth.
+    unbiased: bool,
+    /// That its pictures are finite: what sums up colours over several passes may overflow,
+    /// as it would in hardware, and has no mean then.
+    finite: bool,
+}
+
 /// What was promised and not kept.
-fn broken(design: &Configured, finding: &Finding) -> Option<String> {
-    let unbiased = design.promises().unbiased;
-    if unbiased && let Outcome::NotFinite { pixels } = finding.outcome {
-        return Some(format!("it is unbiased, and {pixels} pixels are not finite"));
+fn broken(promised: &OnCase, finding: &Finding) -> Option<String> {
+    let unbiased = promised.unbiased;
+    if promised.finite
+        && let Outcome::NotFinite { pixels } = finding.outcome
+    {
+        return Some(format!("it is unbiased in one pass, and {pixels} pixels are not finite"));
     }
     if unbiased && let Outcome::Refused { message } = &finding.outcome {
         return Some(format!("it is unbiased, and refuses: {message}"));
