@@ -111,8 +111,7 @@ impl Blueprint for Enderton {
         // chooses among the samples that earlier fragments have left it.
         let mask: MaskRule = values.choice("mask");
         let of_itself = mask != MaskRule::Stratified
-            || values.choice::<Among>("among") == Among::Covered
-            || stochastic::strata_over_rounds(values);
+            || values.choice::<Among>("among") == Among::Covered;
         let apart = depth_bits::tells_apart(values);
         // One object's surfaces share their masks; a table's alphas are rounded.
         let own_masks = values.choice::<SeedBy>("seed-by") != SeedBy::Object;
@@ -214,6 +213,25 @@ impl<const N: usize> EndertonSampler<N> {
         self.dither.value(site, &key, Reference::Lk2011)
     }
 
+    /// ξ of the fragment in one of several rounds that are stratified together.
+    ///
+    /// The fragment's rounds have ξ an even step apart, in random order: `(p + ξ)/R` in
+    /// the round at place p of R. Where the same n samples are left to it in each, they
+    /// write `Σ ⌊αn + (p + ξ)/R⌋ = ⌊R·αn + ξ⌋` samples together (Hermite's identity), as
+    /// one round of as many samples would; and what other rounds have left of the
+    /// fragment need not be known. Each round's ξ by itself is uniform.
+    fn xi_of_round(&self, round: Round, site: Site, words: Words) -> u32 {
+        let xi = self.xi(round, site, words);
+        let bits = round.count.trailing_zeros();
+        if bits == 0 {
+            return xi;
+        }
+        let first = N as u32 * round.count + 1;
+        let key = |r: u32| (words.word(first + r), r);
+        let place = (0..round.count).filter(|r| key(*r) < key(round.index)).count() as u32;
+        place << (u32::BITS - bits) | xi >> bits
+    }
+
     /// `⌊α·n + ξ⌋` of the `n` slots at random: those with the smallest of as many
     /// words; those of the round, as samples.
     fn subset(round: Round, from: SampleMask, count: u32, word: impl Fn(u32) -> u32) -> SampleMask {
@@ -257,13 +275,10 @@ impl<const N: usize> Sampler<N> for EndertonSampler<N> {
         }
         let words = self.words(round, site, fragment);
         let from = match self.among {
-            // What other rounds leave of a fragment is not known: where masks are
-            // stratified over rounds they are chosen among all samples.
-            Among::Passed if round.count == 1 => passed,
-            _ => fragment.coverage,
+            Among::Passed => passed,
+            Among::Covered => fragment.coverage,
         };
         let opacity = Threshold::of(fragment.alpha);
-        let slots = from.count() * round.count;
         let chosen = match self.mask {
             MaskRule::Naive => {
                 probe.hashed(from.count());
@@ -274,7 +289,16 @@ impl<const N: usize> Sampler<N> for EndertonSampler<N> {
                 };
                 from.iter().filter(passes).collect()
             }
+            // What other rounds leave of a fragment is not known: its ξ alone are
+            // stratified over the rounds.
+            MaskRule::Stratified if self.among == Among::Passed => {
+                let ordered = if round.count > 1 { round.count } else { 0 };
+                probe.hashed(1 + from.count() + ordered);
+                let count = opacity.of_many(from.count(), self.xi_of_round(round, site, words));
+                random_subset(from, count, |s| words.word(round.index * N as u32 + s))
+            }
             MaskRule::Stratified => {
+                let slots = from.count() * round.count;
                 probe.hashed(1 + slots);
                 let count = opacity.of_many(slots, self.xi(round, site, words));
                 Self::subset(round, from, count, |slot| words.word(slot))
