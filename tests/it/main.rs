@@ -19,6 +19,7 @@ mod layers;
 mod loaders;
 mod models;
 mod python;
+mod results_document;
 mod stress;
 mod trace_file;
 mod unbiased;
