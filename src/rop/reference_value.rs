@@ -206,12 +206,12 @@ mod tests {
 
     #[test]
     fn fewer_rounds_are_the_first_of_figure_4() {
-        let one = |x: u32| x ^ x.wrapping_mul(LK2011[0]);
-        let two = |x: u32| one(x) ^ one(x).wrapping_mul(LK2011[1]);
-        let three = |x: u32| two(x) ^ two(x).wrapping_mul(LK2011[2]);
-        let four = |x: u32| three(x) ^ three(x).wrapping_mul(LK2011[3]);
-        for (x, s) in [(0, 0), (1, 0), (1 << 31, 1), (0xdead_beef, 0x1234_5678)] {
-            let expected = [one, two, three, four].map(|f| f(x.wrapping_add(s)));
+        let round = |x: u32, factor: u32| x ^ x.wrapping_mul(factor);
+        for (x, s) in [(0_u32, 0), (1, 0), (1 << 31, 1), (0xdead_beef, 0x1234_5678)] {
+            let one = round(x.wrapping_add(s), 0x6c50_b47c);
+            let two = round(one, 0xb82f_1e52);
+            let three = round(two, 0xc7af_e638);
+            let expected = [one, two, three, round(three, 0x8d22_f6e6)];
             let found = [
                 Reference::Lk2011Rounds1,
                 Reference::Lk2011Rounds2,

@@ -52,6 +52,7 @@ pub(super) fn text(text: &mut String, p: &Publications) {
             let outside = m.mean.low > 0.0 || m.mean.high < 0.0;
             vec![
                 m.scene.to_string(),
+                format!("{} × {}", m.side, m.side),
                 format!("`{}`", m.design),
                 m.samples.to_string(),
                 format!("{:+.4} ± {:.4}", m.mean.value, m.mean.half_width()),
@@ -61,7 +62,7 @@ pub(super) fn text(text: &mut String, p: &Publications) {
             ]
         })
         .collect();
-    let header = ["scene", "design", "samples", "mean error", "off 0", "RMSE", "declared"];
+    let header = ["scene", "pixels", "design", "samples", "mean error", "off 0", "RMSE", "declared"];
     text.push_str(&markdown_table(&header, &rows));
     let _ = writeln!(
         text,
