@@ -9,16 +9,21 @@ use crate::report::results::against::{above, below};
 pub(super) struct OnScenes(pub Vec<(String, Estimate)>);
 
 impl OnScenes {
+    /// Those that are known: a ratio of two errors of 0 is not.
+    fn known(&self) -> impl Iterator<Item = &(String, Estimate)> {
+        self.0.iter().filter(|(_, e)| e.value.is_finite() && e.value > 0.0)
+    }
+
     /// Their geometric mean.
     pub fn mean(&self) -> f64 {
-        let logs: f64 = self.0.iter().map(|(_, e)| e.value.ln()).sum();
-        (logs / self.0.len().max(1) as f64).exp()
+        let logs: f64 = self.known().map(|(_, e)| e.value.ln()).sum();
+        (logs / self.known().count().max(1) as f64).exp()
     }
 
     /// The least and the greatest, with the scenes that have them.
     pub fn range(&self) -> String {
         let by = |a: &&(String, Estimate), b: &&(String, Estimate)| a.1.value.total_cmp(&b.1.value);
-        let ends = self.0.iter().min_by(by).zip(self.0.iter().max_by(by));
+        let ends = self.known().min_by(by).zip(self.known().max_by(by));
         ends.map_or("not measured".to_string(), |((low_name, low), (high_name, high))| {
             format!("{:.2} (`{low_name}`) to {:.2} (`{high_name}`)", low.value, high.value)
         })
@@ -100,6 +105,10 @@ mod tests {
         assert_eq!(list.holding(|e| e.value < 3.0).words(), "on all 3 scenes");
         assert!(list.holding(|e| e.value < 3.0).everywhere());
         assert_eq!(list.holding(|e| e.value > 3.0).words(), "on none of 3 scenes");
+        // A scene without errors has no ratio, and takes no part in means.
+        let nothing = Estimate { value: f64::NAN, low: 0.0, high: f64::INFINITY };
+        let more = OnScenes([list.0.as_slice(), &[("d".to_string(), nothing)]].concat());
+        assert_eq!((more.range(), more.mean()), (list.range(), list.mean()));
         let none = OnScenes::default();
         assert_eq!(none.range(), "not measured");
         assert!(!none.holding(|_| true).everywhere());
