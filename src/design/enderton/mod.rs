@@ -110,8 +110,8 @@ impl Blueprint for Enderton {
         // What a fragment chooses follows from its primitive alone, unless it
         // chooses among the samples that earlier fragments have left it.
         let mask: MaskRule = values.choice("mask");
-        let of_itself = mask != MaskRule::Stratified
-            || values.choice::<Among>("among") == Among::Covered;
+        let of_itself =
+            mask != MaskRule::Stratified || values.choice::<Among>("among") == Among::Covered;
         let apart = depth_bits::tells_apart(values);
         // One object's surfaces share their masks; a table's alphas are rounded.
         let own_masks = values.choice::<SeedBy>("seed-by") != SeedBy::Object;

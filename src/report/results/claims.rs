@@ -198,9 +198,8 @@ fn dithered(trial: &Trial) -> Against {
     let kept = dithers.map(|d| of(RMSE, d).holding(|e| !above(e, 1.0 + SAME)));
     let statements: Vec<bool> =
         smoother.iter().chain(&kept).flat_map(|h| h.each.iter().copied()).collect();
-    let figures = dithers.map(|d| {
-        format!("`{d}` {} (pixels: {:.2})", spread(&of(BLOCKS, d)), of(RMSE, d).mean())
-    });
+    let figures = dithers
+        .map(|d| format!("`{d}` {} (pixels: {:.2})", spread(&of(BLOCKS, d)), of(RMSE, d).mean()));
     let words = dithers.iter().zip(&smoother).map(|(d, h)| format!("`{d}` {}", h.words()));
     let everywhere = kept.iter().all(Holding::everywhere);
     Against {

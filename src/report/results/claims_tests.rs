@@ -11,7 +11,12 @@ fn known(value: f64) -> Estimate {
 }
 
 /// A variant with an RMSE, the same over blocks, and a mean error.
-pub(in crate::report::results) fn variant(design: &str, rmse: f64, blocks: f64, mean: f64) -> Variant {
+pub(in crate::report::results) fn variant(
+    design: &str,
+    rmse: f64,
+    blocks: f64,
+    mean: f64,
+) -> Variant {
     let errors = EnsembleErrors {
         seeds: 4,
         pixels: 1000,
@@ -47,9 +52,7 @@ fn a_table_is_acceptable_without_noise_and_bias_and_not_with_either() {
     let trial = |noise: f64, mean: f64| {
         made_up(&TABLE, |d, _| if d == 1 { [10.0 * noise, 5.0, mean] } else { [10.0, 5.0, 0.0] })
     };
-    let verdict = |with, without, mean| {
-        table_of_masks(&[trial(with, mean), trial(without, mean)])
-    };
+    let verdict = |with, without, mean| table_of_masks(&[trial(with, mean), trial(without, mean)]);
     assert_eq!(verdict(1.0, 1.0, 0.0).agreement, Agreement::Confirmed);
     // Noise with antialiasing alone: its masks are of whole pixels.
     let partly = verdict(1.21, 1.0, 0.0);

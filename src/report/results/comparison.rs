@@ -121,7 +121,8 @@ fn ratios(c: &Comparison, a: usize, b: usize, count: u32) -> OnScenes {
 fn pairs(c: &Comparison) -> Vec<(String, usize, usize)> {
     let methods = ["", ":method=alpha-correction", ":method=depth", ":method=depth-correction"];
     let named = methods.into_iter().flat_map(|method| {
-        ["lk", "systematic"].map(|design| (format!("{design}{method}"), format!("enderton{method}")))
+        ["lk", "systematic"]
+            .map(|design| (format!("{design}{method}"), format!("enderton{method}")))
     });
     named.filter_map(|(a, b)| Some((a.clone(), c.contender(&a)?, c.contender(&b)?))).collect()
 }
@@ -182,7 +183,10 @@ fn methods(text: &mut String, c: &Comparison) {
         row
     };
     let rows: Vec<Vec<String>> = pairs(c).into_iter().map(row).collect();
-    text.push_str(&markdown_table(&["design", "4", "8", "16", "32", "at 8", "smaller at 8"], &rows));
+    text.push_str(&markdown_table(
+        &["design", "4", "8", "16", "32", "at 8", "smaller at 8"],
+        &rows,
+    ));
     text.push('\n');
 }
 

@@ -62,7 +62,8 @@ pub(super) fn text(text: &mut String, p: &Publications) {
             ]
         })
         .collect();
-    let header = ["scene", "pixels", "design", "samples", "mean error", "off 0", "RMSE", "declared"];
+    let header =
+        ["scene", "pixels", "design", "samples", "mean error", "off 0", "RMSE", "declared"];
     text.push_str(&markdown_table(&header, &rows));
     let _ = writeln!(
         text,

@@ -160,10 +160,8 @@ fn pixel_orders(text: &mut String, p: &Publications) {
 fn morton(found: &[RowDifference]) -> String {
     let of = |design: &str| found.iter().find(|o| o.design == design).map(|o| o.difference);
     let times = |morton, hilbert| Some(of(morton)? / of(hilbert)?);
-    let bare = times(
-        "lk:pixel-order=morton,reference=radical-inverse",
-        "lk:reference=radical-inverse",
-    );
+    let bare =
+        times("lk:pixel-order=morton,reference=radical-inverse", "lk:reference=radical-inverse");
     let hashed = times("lk:pixel-order=morton", "lk");
     let Some((bare, hashed)) = bare.zip(hashed) else { return "Not measured.".to_string() };
     // Twice as far is no chance: the figures are over hundreds of frames.
@@ -207,7 +205,10 @@ mod tests {
             ]
         };
         let [found, none] = [15.5, 0.5].map(|bare| morton(&list(bare)));
-        assert!(found.contains("31.0 in the unscrambled sequence (the effect is there)"), "{found}");
+        assert!(
+            found.contains("31.0 in the unscrambled sequence (the effect is there)"),
+            "{found}"
+        );
         assert!(none.contains("1.0 in the unscrambled sequence (no effect is seen)"), "{none}");
         assert_eq!(morton(&[]), "Not measured.");
     }

@@ -85,12 +85,8 @@ pub const TABLE: [&str; 4] = [
 ];
 
 /// Numbers of samples rounded at random, and dithered.
-pub const DITHERED: [&str; 4] = [
-    "enderton",
-    "enderton:dither=sequence",
-    "enderton:dither=bayer",
-    "enderton:dither=blue-noise",
-];
+pub const DITHERED: [&str; 4] =
+    ["enderton", "enderton:dither=sequence", "enderton:dither=bayer", "enderton:dither=blue-noise"];
 
 /// Rounds with seeds of their own, and stratified together.
 pub const STRATIFIED: [[&str; 2]; 4] = [
@@ -154,8 +150,7 @@ pub(super) fn claims(
     let side = effort.claims_side();
     progress("scenes of the claims");
     let scenes_of = |pattern| scenes(models, side, pattern);
-    let (antialiased, centred) =
-        (scenes_of(PatternKind::Auto)?, scenes_of(PatternKind::Centre)?);
+    let (antialiased, centred) = (scenes_of(PatternKind::Auto)?, scenes_of(PatternKind::Centre)?);
     let mut tried = |what: &str, scenes: &[Named], designs: &[&str], samples| {
         progress(what);
         trial(scenes, designs, samples, effort.seeds, std::ptr::eq(scenes, &*antialiased))
@@ -195,7 +190,9 @@ fn trial(
     let side = scenes.first().map_or(0, |(_, trace)| trace.header().width);
     let scenes = scenes
         .iter()
-        .map(|(name, trace)| Ok(TriedScene { name, variants: tried(trace, designs, samples, seeds)? }))
+        .map(|(name, trace)| {
+            Ok(TriedScene { name, variants: tried(trace, designs, samples, seeds)? })
+        })
         .collect::<Result<_>>()?;
     Ok(Trial { samples, side, seeds, antialiased, scenes })
 }

@@ -234,7 +234,11 @@ fn variations(base: &CaptureOptions) -> Vec<Way> {
     }
     for side in [base.width * 2, base.width / 2] {
         let what = format!("{side}×{side} pixels");
-        add(Aspect::Size(side), &what, CaptureOptions { width: side, height: side, ..base.clone() });
+        add(
+            Aspect::Size(side),
+            &what,
+            CaptureOptions { width: side, height: side, ..base.clone() },
+        );
     }
     for (what, order) in [
         ("triangles in API order", Order::Api),
