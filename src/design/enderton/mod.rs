@@ -14,7 +14,7 @@ use crate::rop::stochastic::{self, COMBINATIONS, METHOD, OPAQUE, ROUNDS, STRATA}
 use crate::rop::{
     Blueprint, Declaration, Dither, Engine, Family, Frame, Info, OnDevice, OpaquePromise,
     OrderPromise, PixelOrder, PixelWords, Port, Probe, Promises, Reference, ReferenceKey, Round,
-    Sampler, Site, Stochastic, Threshold, depth_bits, random_subset,
+    Sampler, Site, Stochastic, Threshold, depth_bits, random_subset, stratified,
 };
 use crate::tile::TileGrid;
 use crate::trace::{Fragment, MAX_SAMPLES, SampleMask, Unorm32};
@@ -208,28 +208,24 @@ impl<const N: usize> EndertonSampler<N> {
             // One word further than the samples'.
             return words.word(N as u32 * round.count);
         }
-        let pixel = PixelOrder::Hilbert.index(site, self.grid);
-        let key = ReferenceKey { pixel, surface: words.source, seed: words.seed };
-        self.dither.value(site, &key, Reference::Lk2011)
+        self.dither.value(site, &self.key(site, words), Reference::Lk2011)
     }
 
-    /// ξ of the fragment in one of several rounds that are stratified together.
-    ///
-    /// The fragment's rounds have ξ an even step apart, in random order: `(p + ξ)/R` in
-    /// the round at place p of R. Where the same n samples are left to it in each, they
-    /// write `Σ ⌊αn + (p + ξ)/R⌋ = ⌊R·αn + ξ⌋` samples together (Hermite's identity), as
-    /// one round of as many samples would; and what other rounds have left of the
-    /// fragment need not be known. Each round's ξ by itself is uniform.
+    /// What a dither is told of the fragment.
+    fn key(&self, site: Site, words: Words) -> ReferenceKey {
+        let pixel = PixelOrder::Hilbert.index(site, self.grid);
+        ReferenceKey { pixel, surface: words.source, seed: words.seed }
+    }
+
+    /// ξ of the fragment in one of several rounds that are stratified together. What other
+    /// rounds have left of the fragment need not be known: where it is the same n samples
+    /// in each of R, they write ⌊R·αn⌋ or ⌈R·αn⌉ together, as one round of as many would.
     fn xi_of_round(&self, round: Round, site: Site, words: Words) -> u32 {
-        let xi = self.xi(round, site, words);
-        let bits = round.count.trailing_zeros();
-        if bits == 0 {
-            return xi;
+        if self.dither == Dither::White {
+            let first = N as u32 * round.count + 1;
+            return stratified(round, self.xi(round, site, words), |r| words.word(first + r));
         }
-        let first = N as u32 * round.count + 1;
-        let key = |r: u32| (words.word(first + r), r);
-        let place = (0..round.count).filter(|r| key(*r) < key(round.index)).count() as u32;
-        place << (u32::BITS - bits) | xi >> bits
+        self.dither.in_round(round, site, &self.key(site, words), Reference::Lk2011)
     }
 
     /// `⌊α·n + ξ⌋` of the `n` slots at random: those with the smallest of as many

@@ -54,6 +54,10 @@ fn xi(round: Round, words: Words) -> u32 {
 
 // ξ of the fragment in one of several rounds that are stratified together.
 fn xi_of_round(round: Round, words: Words) -> u32 {
+    if !DITHER_WHITE {
+        let key = ReferenceKey(pixel_index(site.x, site.y), words.source, words.seed);
+        return dither_in_round(site.x, site.y, key, round.index, round.count_log2);
+    }
     let all = xi(round, words);
     if round.count_log2 == 0u {
         return all;

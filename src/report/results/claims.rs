@@ -283,10 +283,11 @@ fn rounds_text(text: &mut String, trial: &Trial) {
         "RMSE over the covered pixels of the mean of 8 rounds; {} in each round. \
          `enderton:among=covered` takes its samples over all rounds from one mask. `enderton` \
          chooses among the samples that pass the depth test, which differ from round to round: \
-         there the rounds' ξ are an even step apart, in random order, so that a fragment of \
-         which every round leaves the same n samples writes ⌊8αn + ξ⌋ in all. `lk` and \
-         `systematic` number the samples of all rounds one after the other; where rounds differ \
-         in their surfaces, as chance decides, these are not stratified together.\n",
+         there the rounds' ξ lie in a stratum each, in random order, so that a fragment of which \
+         every round leaves the same n samples writes ⌊8αn⌋ or ⌈8αn⌉ in all; so do those of a \
+         surface of `systematic`. `lk` numbers the samples of all rounds one after the other in its \
+         sequence. Where rounds differ in their surfaces, as chance decides, these are not \
+         stratified together.\n",
         frames(trial)
     );
     let designs: Vec<&str> = STRATIFIED.into_iter().flatten().collect();
