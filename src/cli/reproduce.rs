@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::output::OutputFile;
 use crate::param::Options;
 use crate::picture::write_png;
-use crate::report::{Against, Document, PARTS, document, results};
+use crate::report::{Against, Document, PARTS, check_marks, document, in_short, results};
 use crate::study::file::Publication;
 use crate::study::publications::{Effort, measure_publication};
 
@@ -44,6 +44,9 @@ pub(super) struct Arguments {
     /// Measure only this part; the others stay in RESULTS.md as they are
     #[arg(long, value_name = "PART", value_parser = part)]
     part: Option<Publication>,
+    /// Write the results in short between their marks in this file, too
+    #[arg(long, value_name = "FILE")]
+    readme: Option<PathBuf>,
     #[command(flatten)]
     json: JsonArgument,
 }
@@ -102,6 +105,25 @@ fn part(text: &str) -> std::result::Result<Publication, String> {
     found.ok_or_else(|| Error::unknown("part", text, names).to_string())
 }
 
+/// A document that repeats the results in short.
+struct Readme {
+    text: String,
+    file: OutputFile,
+}
+
+impl Readme {
+    fn open(path: &PathBuf) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(|e| Error::io("read", path, e))?;
+        check_marks(&text)?;
+        Ok(Readme { text, file: OutputFile::create(path)? })
+    }
+
+    fn write(mut self, results: &str) -> Result<()> {
+        self.file.write_bytes(in_short(&self.text, results)?.as_bytes())?;
+        self.file.commit()
+    }
+}
+
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     if let Some(models) = arguments.models.as_ref().filter(|m| !m.is_dir()) {
         let why = "there is no such folder; name the one that holds the models";
@@ -120,6 +142,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         Err(e) if e.kind() == io::ErrorKind::NotFound => String::new(),
         Err(e) => return Err(Error::io("read", &path, e)),
     };
+    let readme = arguments.readme.as_ref().map(Readme::open).transpose()?;
     let effort = Effort {
         seeds: arguments.seeds,
         seeds_of_means: arguments.seeds_of_means,
@@ -160,7 +183,8 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
             write_png(folder.join(format!("{name}.png")), picture)?;
         }
         file.write_bytes(text.as_bytes())?;
-        file.commit()
+        file.commit()?;
+        readme.map_or(Ok(()), |readme| readme.write(&text))
     };
     if let Err(error) = save() {
         // What has been measured is not lost.

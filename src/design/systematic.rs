@@ -153,23 +153,20 @@ impl References for Evenly {
         let again = self.phase == Phase::Count && of.first;
         let (before, hashes) = match *kept {
             Some(phase) if !again => (phase, 0),
-            _ => (self.dither.value(of.site, of.key, self.reference), 1),
+            _ => (self.dither.in_round(of.round, of.site, of.key, self.reference), 1),
         };
         // Modulo 2^32: an opaque fragment's threshold, 2^32, leaves the phase as it is.
         let threshold = of.opacity.value() as u32;
-        // Rounds that are stratified together number their samples one after the other.
-        let earlier = threshold.wrapping_mul(of.round.index * N as u32);
         match self.phase {
             Phase::Sum => {
-                let start = if kept.is_none() { before.wrapping_add(earlier) } else { before };
-                let phase = start.wrapping_add(threshold);
+                let phase = before.wrapping_add(threshold);
                 *kept = Some(phase);
                 (phase, hashes)
             }
             Phase::Count => {
                 *kept = Some(before);
                 let steps = threshold.wrapping_mul(n + 1);
-                (before.wrapping_add(earlier).wrapping_add(steps), hashes)
+                (before.wrapping_add(steps), hashes)
             }
         }
     }
@@ -187,7 +184,8 @@ impl OnDevice<Option<u32>> for Evenly {
         if let Some(ranks) = self.dither.ranks() {
             to.ranks(ranks);
         }
-        to.iterations(u32::BITS);
+        // A reference value's, and the places of the rounds.
+        to.iterations(u32::BITS + 8);
         // Whether there is one, behind it.
         to.field("PHASE", if self.phase == Phase::Sum { 2 } else { 0 });
     }
@@ -223,19 +221,17 @@ impl<const N: usize> FastReferences<N> for Evenly {
             return 0;
         }
         let threshold = of.opacity.value() as u32;
-        let earlier = threshold.wrapping_mul(of.round.index * N as u32);
         let xi = match *kept {
             Some(phase) if self.phase == Phase::Sum => phase,
             _ => {
                 tally.hashed(1);
-                let xi = self.dither.value(of.site, of.key, self.reference);
-                if self.phase == Phase::Sum { xi.wrapping_add(earlier) } else { xi }
+                self.dither.in_round(of.round, of.site, of.key, self.reference)
             }
         };
         // Phases of a run of samples are even steps on; `first` is where it starts.
         let start = match self.phase {
             Phase::Sum => xi,
-            Phase::Count => xi.wrapping_add(earlier).wrapping_add(threshold.wrapping_mul(first)),
+            Phase::Count => xi.wrapping_add(threshold.wrapping_mul(first)),
         };
         let end = start.wrapping_add(threshold.wrapping_mul(count));
         *kept = Some(if self.phase == Phase::Sum { end } else { xi });
@@ -269,9 +265,9 @@ impl<const N: usize> FastReferences<N> for Summed {
         (kept.unwrap_or_default(), kept.is_some())
     }
 
-    /// One value a pixel, whatever the round.
-    fn base(_: &Round, key: &ReferenceKey) -> Base {
-        Base::of(0, 1, key)
+    /// One value a pixel and round.
+    fn base(round: &Round, key: &ReferenceKey) -> Base {
+        Base::of(round.index, round.count, key)
     }
 
     #[inline(always)]
@@ -283,17 +279,16 @@ impl<const N: usize> FastReferences<N> for Summed {
         samples: Numbered<'_>,
         tally: &mut Tally<'_, P>,
     ) -> u64 {
-        let Numbered { of, limit, base, starts, count, .. } = samples;
+        let Numbered { limit, base, starts, count, .. } = samples;
         let (phase, begun) = *kept;
         tally.hashed(u32::from(!begun && count > 0));
         let threshold = limit.threshold().value() as u32;
-        let earlier = threshold.wrapping_mul(of.round.index * N as u32);
         // Of the next surface in any case: then it need not be waited for.
-        let next = base.of_surface(1).first_lk2011().wrapping_add(earlier);
+        let next = base.of_surface(1).first_lk2011();
         let start = match (starts, begun) {
             (true, _) => next,
             (false, true) => phase,
-            (false, false) => first(base).wrapping_add(earlier),
+            (false, false) => first(base),
         };
         *kept = (start.wrapping_add(threshold.wrapping_mul(count)), begun || count > 0);
         evenly(simd, loaded, start, limit)

@@ -1,5 +1,6 @@
 //! Errors over several seeds, variance and bias apart.
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::metrics::temporal::Deviations;
@@ -75,8 +76,10 @@ impl<'a> Ensemble<'a> {
     /// # Panics
     /// Where its frame differs from the reference's.
     pub fn add(&mut self, picture: &Picture) {
-        for (runs, region) in self.runs.iter_mut().zip(&self.regions) {
-            runs.push(errors(picture, self.reference, region));
+        let of_region = |region: &&Region| errors(picture, self.reference, region);
+        let found: Vec<Errors> = self.regions.par_iter().map(of_region).collect();
+        for (runs, found) in self.runs.iter_mut().zip(found) {
+            runs.push(found);
         }
         match self.waiting.take() {
             None => self.waiting = Some(picture.clone()),

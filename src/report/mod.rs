@@ -10,7 +10,9 @@ mod stability;
 
 pub use folder::{About, PAGE, write_report};
 pub use montage::{Panel, montage};
-pub use results::{Against, Agreement, Document, FIGURES, Figure, PARTS, document, results};
+pub use results::{
+    Against, Agreement, Document, FIGURES, Figure, PARTS, check_marks, document, in_short, results,
+};
 pub use stability::stability;
 
 /// A Markdown table; columns of numbers stand to the right.

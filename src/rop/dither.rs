@@ -7,6 +7,7 @@ use crate::random::hash;
 use crate::rop::design::Site;
 use crate::rop::pixel_order::PixelIndex;
 use crate::rop::reference_value::{Reference, ReferenceKey};
+use crate::rop::stochastic::Round;
 
 crate::options! {
     /// How ξ is spread over the pixels.
@@ -29,6 +30,7 @@ pub type Ranks = [u16; TILE * TILE];
 /// A hash's last word that keeps it apart from others of the same seed and pixel.
 const OFFSET: u32 = 0x0ff5_e700;
 const FINE: u32 = 0x0f19_e000;
+const ROUND: u32 = 0x0c0d_e500;
 
 impl Dither {
     /// The matrix of a dither that has one.
@@ -57,6 +59,41 @@ impl Dither {
         let fine = hash([key.seed, pixel, key.surface, FINE]) >> RANK_BITS;
         u32::from(ranks[y * TILE + x]) << (32 - RANK_BITS) | fine
     }
+}
+
+impl Dither {
+    /// ξ of a surface in one of several rounds that are stratified together: by itself as
+    /// good as [`Dither::value`], and of R rounds one in each Rth of [0, 1). Where a round
+    /// writes `⌊x + ξ⌋` samples, with the same x in each, they write ⌊Rx⌋ or ⌈Rx⌉ together.
+    pub fn in_round(
+        self,
+        round: Round,
+        site: Site,
+        key: &ReferenceKey,
+        reference: Reference,
+    ) -> u32 {
+        if self == Dither::Sequence {
+            // The rounds' values follow each other in the sequence, as samples do.
+            return reference.value(round.index, round.count, key);
+        }
+        let PixelIndex(pixel) = key.pixel;
+        let word = |r| hash([key.seed, pixel, key.surface, ROUND + r]);
+        stratified(round, self.value(site, key, reference), word)
+    }
+}
+
+/// The ξ of one of R rounds, an even step apart in an order at random, which `word` gives a
+/// random word for each: `(p + ξ)/R` in the round at place p. Then
+/// `Σ ⌊x + (p + ξ)/R⌋ = ⌊R·x + ξ⌋` (Hermite's identity).
+pub fn stratified(round: Round, xi: u32, word: impl Fn(u32) -> u32) -> u32 {
+    let bits = round.count.trailing_zeros();
+    if bits == 0 {
+        return xi;
+    }
+    let key = |r: u32| (word(r), r);
+    let own = key(round.index);
+    let place = (0..round.count).filter(|r| key(*r) < own).count() as u32;
+    place << (u32::BITS - bits) | xi >> bits
 }
 
 /// Bayer's matrix: rank bits are those of `x ^ y` and `y` in turn, the lowest first.
@@ -159,6 +196,7 @@ fn void_and_cluster() -> Box<Ranks> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::param::Options;
 
     #[test]
     fn tiles_hold_each_rank_once_and_bayer_begins_as_published() {
@@ -170,6 +208,52 @@ mod tests {
         // Bayer's matrix of 2 × 2, [[0, 2], [3, 1]], in the highest bits.
         let quarter = |x: usize, y: usize| BAYER[y * TILE + x] / 1024;
         assert_eq!([quarter(0, 0), quarter(1, 0), quarter(0, 1), quarter(1, 1)], [0, 2, 3, 1]);
+    }
+
+    #[test]
+    fn rounds_have_a_stratum_each_and_write_as_many_samples_as_one_would() {
+        let site = Site { x: 9, y: 5 };
+        for (dither, seed) in Dither::ALL.iter().flat_map(|d| (0..20).map(move |s| (*d, s))) {
+            let key = ReferenceKey { pixel: PixelIndex(77), surface: 3, seed };
+            for count in [1, 2, 4, 8] {
+                let of = |index| {
+                    let round = Round { index, count, seed };
+                    u64::from(dither.in_round(round, site, &key, Reference::Lk2011))
+                };
+                let all: Vec<u64> = (0..count).map(of).collect();
+                let mut strata: Vec<u64> =
+                    all.iter().map(|x| (x * u64::from(count)) >> 32).collect();
+                strata.sort_unstable();
+                assert_eq!(strata, (0..u64::from(count)).collect::<Vec<_>>(), "{dither:?}");
+                for share in [0.1, 0.4, 0.5, 1.6, 2.0] {
+                    let x = (share * 2_f64.powi(32)) as u64;
+                    let written: u64 = all.iter().map(|xi| (x + xi) >> 32).sum();
+                    let expected = share * f64::from(count);
+                    assert!(
+                        (written as f64 - expected).abs() < 1.0 + 1e-6,
+                        "{dither:?}: {written}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn each_round_by_itself_is_uniform() {
+        // The mean of 4096 uniform numbers is off by more than 6 σ = 6/√(12·4096) never.
+        let site = Site { x: 1, y: 2 };
+        for dither in [Dither::White, Dither::Sequence, Dither::BlueNoise] {
+            for index in 0..4 {
+                let of = |seed| {
+                    let key = ReferenceKey { pixel: PixelIndex(5), surface: 1, seed };
+                    let round = Round { index, count: 4, seed };
+                    f64::from(dither.in_round(round, site, &key, Reference::Lk2011))
+                        / 2_f64.powi(32)
+                };
+                let mean = (0..4096).map(of).sum::<f64>() / 4096.0;
+                assert!((mean - 0.5).abs() < 0.028, "{dither:?}, round {index}: {mean}");
+            }
+        }
     }
 
     /// The variance of the mean of ξ over blocks of 4 × 4 pixels, as a share of that of

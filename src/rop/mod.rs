@@ -32,7 +32,7 @@ pub use design::{
     Blueprint, Contents, Design, Family, Frame, Info, OpaquePromise, OrderPromise, Promises, Site,
     StateBits,
 };
-pub use dither::{BAYER, BLUE_NOISE, Dither, Ranks, TILE};
+pub use dither::{BAYER, BLUE_NOISE, Dither, Ranks, TILE, stratified};
 pub use event::{EventCounts, NoProbe, Probe, Record, ReferenceRecord};
 pub use moments::{MomentCount, Moments};
 pub use normalise::{Normalise, Sums};

@@ -8,6 +8,9 @@ crate::options! {
     /// How reference values are made.
     pub enum Reference {
         Lk2011 = "lk2011": "four multiply-XOR rounds (LK figure 4; Burley, JCGT 9(4), 2020)",
+        Lk2011Rounds1 = "lk2011-1": "the first of figure 4's four rounds alone",
+        Lk2011Rounds2 = "lk2011-2": "the first two of figure 4's four rounds",
+        Lk2011Rounds3 = "lk2011-3": "the first three of figure 4's four rounds",
         VegdahlV2 = "vegdahl-v2": "fewer multiplications, constants found by search (psychopath.io, January 2021)",
         Vegdahl = "vegdahl": "the seed multiplied in (psychopath.io; sobol_burley, pbrt-v4's FastOwenScrambler)",
         Owen = "owen": "one random flip for each node of the binary tree (Owen 1995)",
@@ -44,12 +47,28 @@ impl Reference {
     pub fn scramble(self, x: u32, s: u32) -> u32 {
         match self {
             Reference::Lk2011 => scramble_lk2011(x.wrapping_add(s)),
+            Reference::Lk2011Rounds1 | Reference::Lk2011Rounds2 | Reference::Lk2011Rounds3 => {
+                let rounds = LK2011.iter().take(self.lk2011_rounds().unwrap_or(0));
+                rounds.fold(x.wrapping_add(s), |x, factor| x ^ x.wrapping_mul(*factor))
+            }
             Reference::VegdahlV2 => scramble_vegdahl_v2(x, s),
             Reference::Vegdahl => scramble_vegdahl(x, s),
             Reference::Owen => scramble_owen(x, s),
             Reference::Sobol => scramble_sobol(x.wrapping_add(s)),
             Reference::RadicalInverse => x.wrapping_add(s),
             Reference::White => hash([s, x]),
+        }
+    }
+
+    /// How many of figure 4's multiply-XOR rounds a value passes through; `None` for
+    /// other hashes.
+    pub fn lk2011_rounds(self) -> Option<usize> {
+        match self {
+            Reference::Lk2011Rounds1 => Some(1),
+            Reference::Lk2011Rounds2 => Some(2),
+            Reference::Lk2011Rounds3 => Some(3),
+            Reference::Lk2011 => Some(LK2011.len()),
+            _ => None,
         }
     }
 
@@ -63,7 +82,8 @@ impl Reference {
 
     /// Whether two surfaces of a pixel get unrelated values.
     pub fn scrambles(self) -> bool {
-        !matches!(self, Reference::RadicalInverse | Reference::Sobol)
+        // One round leaves the lowest bits of every factor's multiples in place.
+        !matches!(self, Reference::RadicalInverse | Reference::Sobol | Reference::Lk2011Rounds1)
     }
 }
 
@@ -181,6 +201,25 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    #[test]
+    fn fewer_rounds_are_the_first_of_figure_4() {
+        let round = |x: u32, factor: u32| x ^ x.wrapping_mul(factor);
+        for (x, s) in [(0_u32, 0), (1, 0), (1 << 31, 1), (0xdead_beef, 0x1234_5678)] {
+            let one = round(x.wrapping_add(s), 0x6c50_b47c);
+            let two = round(one, 0xb82f_1e52);
+            let three = round(two, 0xc7af_e638);
+            let expected = [one, two, three, round(three, 0x8d22_f6e6)];
+            let found = [
+                Reference::Lk2011Rounds1,
+                Reference::Lk2011Rounds2,
+                Reference::Lk2011Rounds3,
+                Reference::Lk2011,
+            ]
+            .map(|reference| reference.scramble(x, s));
+            assert_eq!(found, expected);
         }
     }
 

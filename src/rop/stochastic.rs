@@ -57,7 +57,7 @@ crate::options! {
     /// Over what masks are stratified where samples are drawn several times.
     pub enum Strata {
         Round = "round": "within each round: other seeds",
-        All = "all": "over all rounds together (E section 4, footnote)",
+        All = "all": "over all rounds together (E section 4, footnote 4)",
     }
 }
 

@@ -131,8 +131,10 @@ pub fn measure(
                 if plan.seeds == 1 || !options.count_events {
                     seconds.push(start.elapsed().as_secs_f64());
                 }
-                ensemble.add(&replayed.picture);
-                let against_fine = errors(&replayed.picture, &fine, &fine_covered);
+                let ((), against_fine) = rayon::join(
+                    || ensemble.add(&replayed.picture),
+                    || errors(&replayed.picture, &fine, &fine_covered),
+                );
                 squares.push(against_fine.rmse * against_fine.rmse);
                 squares_srgb.push(against_fine.rmse_srgb * against_fine.rmse_srgb);
                 first.get_or_insert(replayed);

@@ -20,6 +20,7 @@ mod layers;
 mod loaders;
 mod models;
 mod python;
+mod results_document;
 mod seal;
 mod stress;
 mod trace_file;

@@ -14,7 +14,7 @@ use crate::rop::stochastic::{self, COMBINATIONS, METHOD, OPAQUE, ROUNDS, STRATA}
 use crate::rop::{
     Blueprint, Declaration, Dither, Engine, Family, Frame, Info, OnDevice, OpaquePromise,
     OrderPromise, PixelOrder, PixelWords, Port, Probe, Promise, Promises, Reference, ReferenceKey,
-    Round, Sampler, Site, Stochastic, Threshold, depth_bits, random_subset,
+    Round, Sampler, Site, Stochastic, Threshold, depth_bits, random_subset, stratified,
 };
 use crate::tile::TileGrid;
 use crate::trace::{Fragment, MAX_SAMPLES, SampleMask, Unorm32};
@@ -110,9 +110,8 @@ impl Blueprint for Enderton {
         // What a fragment chooses follows from its primitive alone, unless it
         // chooses among the samples that earlier fragments have left it.
         let mask: MaskRule = values.choice("mask");
-        let of_itself = mask != MaskRule::Stratified
-            || values.choice::<Among>("among") == Among::Covered
-            || stochastic::strata_over_rounds(values);
+        let of_itself =
+            mask != MaskRule::Stratified || values.choice::<Among>("among") == Among::Covered;
         let apart = depth_bits::tells_apart(values);
         // One object's surfaces share their masks, and so do fragments of one depth; a
         // table's alphas are rounded.
@@ -215,9 +214,24 @@ impl<const N: usize> EndertonSampler<N> {
             // One word further than the samples'.
             return words.word(N as u32 * round.count);
         }
+        self.dither.value(site, &self.key(site, words), Reference::Lk2011)
+    }
+
+    /// What a dither is told of the fragment.
+    fn key(&self, site: Site, words: Words) -> ReferenceKey {
         let pixel = PixelOrder::Hilbert.index(site, self.grid);
-        let key = ReferenceKey { pixel, surface: words.source, seed: words.seed };
-        self.dither.value(site, &key, Reference::Lk2011)
+        ReferenceKey { pixel, surface: words.source, seed: words.seed }
+    }
+
+    /// ξ of the fragment in one of several rounds that are stratified together. What other
+    /// rounds have left of the fragment need not be known: where it is the same n samples
+    /// in each of R, they write ⌊R·αn⌋ or ⌈R·αn⌉ together, as one round of as many would.
+    fn xi_of_round(&self, round: Round, site: Site, words: Words) -> u32 {
+        if self.dither == Dither::White {
+            let first = N as u32 * round.count + 1;
+            return stratified(round, self.xi(round, site, words), |r| words.word(first + r));
+        }
+        self.dither.in_round(round, site, &self.key(site, words), Reference::Lk2011)
     }
 
     /// `⌊α·n + ξ⌋` of the `n` slots at random: those with the smallest of as many
@@ -263,13 +277,10 @@ impl<const N: usize> Sampler<N> for EndertonSampler<N> {
         }
         let words = self.words(round, site, fragment);
         let from = match self.among {
-            // What other rounds leave of a fragment is not known: where masks are
-            // stratified over rounds they are chosen among all samples.
-            Among::Passed if round.count == 1 => passed,
-            _ => fragment.coverage,
+            Among::Passed => passed,
+            Among::Covered => fragment.coverage,
         };
         let opacity = Threshold::of(fragment.alpha);
-        let slots = from.count() * round.count;
         let chosen = match self.mask {
             MaskRule::Naive => {
                 probe.hashed(from.count());
@@ -280,7 +291,16 @@ impl<const N: usize> Sampler<N> for EndertonSampler<N> {
                 };
                 from.iter().filter(passes).collect()
             }
+            // What other rounds leave of a fragment is not known: its ξ alone are
+            // stratified over the rounds.
+            MaskRule::Stratified if self.among == Among::Passed => {
+                let ordered = if round.count > 1 { round.count } else { 0 };
+                probe.hashed(1 + from.count() + ordered);
+                let count = opacity.of_many(from.count(), self.xi_of_round(round, site, words));
+                random_subset(from, count, |s| words.word(round.index * N as u32 + s))
+            }
             MaskRule::Stratified => {
+                let slots = from.count() * round.count;
                 probe.hashed(1 + slots);
                 let count = opacity.of_many(slots, self.xi(round, site, words));
                 Self::subset(round, from, count, |slot| words.word(slot))

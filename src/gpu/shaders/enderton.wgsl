@@ -5,6 +5,9 @@
 const PIXEL_ORDER_MORTON: bool = false;
 const PIXEL_ORDER_SCANLINE: bool = false;
 const REFERENCE_WHITE: bool = false;
+const REFERENCE_LK2011_1: bool = false;
+const REFERENCE_LK2011_2: bool = false;
+const REFERENCE_LK2011_3: bool = false;
 const REFERENCE_VEGDAHL_V2: bool = false;
 const REFERENCE_VEGDAHL: bool = false;
 const REFERENCE_OWEN: bool = false;
@@ -49,16 +52,35 @@ fn xi(round: Round, words: Words) -> u32 {
     return dither_value(site.x, site.y, key);
 }
 
-// EndertonSampler::subset: the `count` slots with the smallest words; those of the round,
-// as samples. A slot is chosen if fewer than `count` come before it.
-fn subset(round: Round, candidates: Mask, count: u32) -> Mask {
+// ξ of the fragment in one of several rounds that are stratified together.
+fn xi_of_round(round: Round, words: Words) -> u32 {
+    if !DITHER_WHITE {
+        let key = ReferenceKey(pixel_index(site.x, site.y), words.source, words.seed);
+        return dither_in_round(site.x, site.y, key, round.index, round.count_log2);
+    }
+    let all = xi(round, words);
+    if round.count_log2 == 0u {
+        return all;
+    }
+    let first = (SAMPLES << round.count_log2) + 1u;
+    let own = word_of(words, first + round.index);
+    var before = 0u;
+    for (var r = 0u; r < (1u << round.count_log2); r++) {
+        let word = word_of(words, first + r);
+        before += select(0u, 1u, word < own || (word == own && r < round.index));
+    }
+    return (before << (32u - round.count_log2)) | (all >> round.count_log2);
+}
+
+// EndertonSampler::subset: the `count` of the slots with the smallest words; of them those
+// from `own` on, as samples. A slot is chosen if fewer than `count` come before it.
+fn subset(candidates: Mask, count: u32, own: u32, slots: u32) -> Mask {
     var chosen = MASK_NONE;
-    let slots = SAMPLES << round.count_log2;
     for (var s = 0u; s < SAMPLES; s++) {
         if !mask_contains(candidates, s) {
             continue;
         }
-        let slot = round.index * SAMPLES + s;
+        let slot = own + s;
         var before = 0u;
         for (var other = 0u; other < slots; other++) {
             let smaller = slot_words[other] < slot_words[slot]
@@ -78,7 +100,7 @@ fn choose(round: Round, passed: Mask, f: Fragment) -> Mask {
     }
     let words = words_of(round, f);
     var candidates = f.coverage;
-    if AMONG_PASSED && round.count_log2 == 0u {
+    if AMONG_PASSED {
         candidates = passed;
     }
     let opacity = threshold_of(f.alpha);
@@ -89,6 +111,12 @@ fn choose(round: Round, passed: Mask, f: Fragment) -> Mask {
                 chosen |= mask_bit(s);
             }
         }
+    } else if MASK_STRATIFIED && AMONG_PASSED {
+        let count = of_many(opacity, mask_count(candidates), xi_of_round(round, words));
+        for (var s = 0u; s < SAMPLES; s++) {
+            slot_words[s] = word_of(words, round.index * SAMPLES + s);
+        }
+        chosen = subset(candidates, count, 0u, SAMPLES);
     } else if MASK_STRATIFIED {
         let slots = mask_count(candidates) << round.count_log2;
         let count = of_many(opacity, slots, xi(round, words));
@@ -97,7 +125,7 @@ fn choose(round: Round, passed: Mask, f: Fragment) -> Mask {
                 slot_words[slot] = word_of(words, slot);
             }
         }
-        chosen = subset(round, candidates, count);
+        chosen = subset(candidates, count, round.index * SAMPLES, SAMPLES << round.count_log2);
     } else {
         chosen = look_up(round, f.alpha, words);
     }
@@ -121,5 +149,6 @@ fn look_up(round: Round, alpha: f32, words: Words) -> Mask {
     for (var slot = 0u; slot < SLOTS; slot++) {
         slot_words[slot] = hash4(words.seed, row, column, slot);
     }
-    return subset(round, mask_of(params.samples_low, params.samples_high), count);
+    let all = mask_of(params.samples_low, params.samples_high);
+    return subset(all, count, round.index * SAMPLES, slots);
 }

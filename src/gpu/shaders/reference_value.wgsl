@@ -55,8 +55,17 @@ fn place(n: u32, samples_log2: u32, key: ReferenceKey) -> vec2<u32> {
 fn scramble_lk2011(seeded: u32) -> u32 {
     var x = seeded;
     x ^= x * 0x6c50b47cu;
+    if REFERENCE_LK2011_1 {
+        return x;
+    }
     x ^= x * 0xb82f1e52u;
+    if REFERENCE_LK2011_2 {
+        return x;
+    }
     x ^= x * 0xc7afe638u;
+    if REFERENCE_LK2011_3 {
+        return x;
+    }
     return x ^ (x * 0x8d22f6e6u);
 }
 

@@ -38,17 +38,16 @@ fn references_begin(round: Round, key: ReferenceKey, opacity: Threshold, number:
     if count == 0u {
         return;
     }
-    // Rounds that are stratified together number their samples one after the other.
-    let earlier = opacity.low * (round.index * SAMPLES);
     if PHASE_SUM {
         if !begun {
-            phase = dither_value(site.x, site.y, key) + earlier;
+            phase = dither_in_round(site.x, site.y, key, round.index, round.count_log2);
         }
         start = phase;
         phase += opacity.low * count;
         begun = true;
     } else {
-        start = dither_value(site.x, site.y, key) + earlier + opacity.low * number;
+        let xi = dither_in_round(site.x, site.y, key, round.index, round.count_log2);
+        start = xi + opacity.low * number;
     }
 }
 

@@ -2,8 +2,11 @@
 
 use std::fmt::Write;
 
+use crate::metrics::Estimate;
 use crate::report::markdown_table;
+use crate::report::results::against::above;
 use crate::report::results::ratio;
+use crate::report::results::ratios::{Holding, OnScenes, holding};
 use crate::report::results::table_1::runs;
 use crate::study::publications::{Aspect, COUNTS, Order, Publications, Published, Variation};
 
@@ -39,13 +42,13 @@ pub(super) fn text(text: &mut String, p: &Publications) {
     text.push_str(&markdown_table(&["error at 4 ÷ at 64", "lk", "enderton", "naive"], &rows));
     let _ = writeln!(
         text,
-        "\n2. **The paper's comparison method behaves like sampling without stratification.** Its \
-         error falls by a factor of about 4 from 4 to 64 samples, which is N^−½: what `naive` \
-         does. `enderton` as the paper describes it (depth test first, then ⌊αn+ξ⌋ of the n \
-         survivors) stratifies whole fragments. \
-         The largest difference between the published ratio and ours over all counts:\n"
+        "\n2. **Whether the paper's comparison method stratifies.** N^−½, without stratification, \
+         falls by {:.1} from 4 to 64 samples. `enderton` as the paper describes it (depth test \
+         first, then ⌊αn+ξ⌋ of the n survivors) stratifies whole fragments. \
+         The largest difference between the published ratio and ours over all counts:\n",
+        f64::from(COUNTS[COUNTS.len() - 1] / COUNTS[0]).sqrt()
     );
-    let mut nearer = 0;
+    let mut nearer = Vec::new();
     let rows: Vec<Vec<String>> = p
         .table_1
         .iter()
@@ -57,16 +60,16 @@ pub(super) fn text(text: &mut String, p: &Publications) {
                     *worst = worst.max((lk / other - a / b).abs());
                 }
             }
-            nearer += u32::from(worst[1] < worst[0]);
+            nearer.push((table.name, worst[1] < worst[0]));
             vec![table.name.to_string(), format!("{:.2}", worst[0]), format!("{:.2}", worst[1])]
         })
         .collect();
+    let nearer = holding(nearer.into_iter());
     text.push_str(&markdown_table(&["scene", "lk ÷ enderton", "lk ÷ naive"], &rows));
     let _ = writeln!(
         text,
-        "\nThe published ratios lie nearer to `lk ÷ naive` than to `lk ÷ enderton` on {nearer} of \
-         these {} scenes.\n",
-        p.table_1.len()
+        "\nThe published ratios lie nearer to `lk ÷ naive` than to `lk ÷ enderton` {}.\n",
+        nearer.words()
     );
     if !p.variations.is_empty() {
         views(text, p);
@@ -75,34 +78,36 @@ pub(super) fn text(text: &mut String, p: &Publications) {
 
 /// How edges, order, view and background change the ratio.
 fn views(text: &mut String, p: &Publications) {
-    let (lk_to_enderton, enderton_to_naive) =
-        (|[lk, e, _]: [f64; 3]| lk / e, |[_, e, naive]: [f64; 3]| e / naive);
-    let by_order = |order| {
-        range(p, lk_to_enderton, |a| [Aspect::Nothing(order), Aspect::Order(order)].contains(&a))
-    };
+    let (seen, side) = (&p.variations, p.effort.comparison_side);
+    let order = |order| in_order(seen, order).words();
     let _ = writeln!(
         text,
-        "3. **Edges.** A fragment that covers one or two samples leaves `enderton` nothing to \
-         stratify; LK stratifies over the surface. In smaller frames triangles stay and pixels \
-         grow: `enderton` ÷ `naive` at 16 samples is {} in the table's frame and {} in the \
-         smallest one below. The paper does not state its frame size.\n\
+        "3. **Edges.** Of a fragment that covers one sample or two `enderton` stratifies nothing; LK \
+         stratifies over the surface. In smaller frames triangles stay and pixels grow. \
+         `enderton` ÷ `naive` at {SAMPLES} samples is {} in frames of {} × {} pixels and {} in those \
+         of {} × {}; it is greater in the smaller frame {}.\n\
          4. **Order.** LK's tracking counts on a surface's fragments coming one after the other. \
-         `lk` ÷ `enderton` at 16 samples is {} with the triangles near to far, {} far to near, \
-         {} in random order and {} in the files' own. The paper's CLOTH is in random order, like \
-         ours; its MOTOR's order is not stated, ours is the file's.\n\
-         5. **View and background.** Absolute errors depend on how far the layers' colours lie \
-         apart, thus on shading and background. From other angles and before white \
-         `lk` ÷ `enderton` changes by {:.0} % at most. Shading here is diffuse with a key and a \
-         fill light; the paper does not describe its lights.\n\n\
-         At 16 samples, against the exact picture of the same samples ([?]: too few seeds for an \
-         interval):\n",
-        range(p, enderton_to_naive, |a| matches!(a, Aspect::Nothing(_))),
-        range(p, enderton_to_naive, |a| a == Aspect::Size(8)),
-        by_order(Order::NearToFar),
-        by_order(Order::FarToNear),
-        by_order(Order::Random),
-        by_order(Order::Api),
-        100.0 * largest_change(p),
+         `lk` ÷ `enderton` at {SAMPLES} samples, {side} × {side} pixels: with the triangles near to \
+         far {}; far to near {}; in random order {}; in the scenes' own {}. The paper's CLOTH is \
+         in random order; its MOTOR's order is not stated.\n\
+         5. **View and background.** From other angles and before white `lk` ÷ `enderton` changes \
+         by {} at {side} × {side} pixels. Shading here is diffuse with a key and a fill light; the \
+         paper does not describe its lights.\n\n\
+         At {SAMPLES} samples, against the exact picture of the same samples, {} seeds ([?]: too few \
+         seeds for an interval):\n",
+        sized(seen, 2 * side, enderton_to_naive).range(),
+        2 * side,
+        2 * side,
+        sized(seen, side / 2, enderton_to_naive).range(),
+        side / 2,
+        side / 2,
+        more_in_small_frames(seen, side).words(),
+        order(Order::NearToFar),
+        order(Order::FarToNear),
+        order(Order::Random),
+        order(Order::Api),
+        change_of_view(seen),
+        p.effort.seeds
     );
     let rows: Vec<Vec<String>> = p
         .variations
@@ -137,24 +142,137 @@ fn views(text: &mut String, p: &Publications) {
     text.push('\n');
 }
 
-/// The least and the greatest of a ratio of the designs' RMSE over the variations of
-/// some aspects.
-fn range(p: &Publications, of: fn([f64; 3]) -> f64, which: impl Fn(Aspect) -> bool) -> String {
-    let chosen = p.variations.iter().filter(|v| which(v.aspect));
-    let ratios: Vec<f64> = chosen.map(|v| of(v.rmse.map(|e| e.value))).collect();
-    let low = ratios.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = ratios.iter().copied().fold(0.0, f64::max);
-    if ratios.is_empty() { "not measured".into() } else { format!("{low:.2} to {high:.2}") }
+/// Samples of the variations.
+const SAMPLES: u32 = 16;
+
+fn lk_to_enderton(v: &Variation) -> Estimate {
+    v.rmse[0].ratio(v.rmse[1])
 }
 
-/// The largest relative change of `lk ÷ enderton` with angle and background.
-fn largest_change(p: &Publications) -> f64 {
-    let ratio = |v: &Variation| v.rmse[0].value / v.rmse[1].value;
-    let changes = p.variations.iter().filter_map(|v| {
-        let base = |b: &&Variation| b.scene == v.scene && matches!(b.aspect, Aspect::Nothing(_));
-        let base = p.variations.iter().find(base)?;
-        let counts = matches!(v.aspect, Aspect::Angle | Aspect::Background);
-        counts.then(|| (ratio(v) / ratio(base) - 1.0).abs())
+fn enderton_to_naive(v: &Variation) -> Estimate {
+    v.rmse[1].ratio(v.rmse[2])
+}
+
+/// A ratio of the designs' RMSE on the scenes that are seen in some way.
+fn seen_as(
+    seen: &[Variation],
+    which: impl Fn(Aspect) -> bool,
+    of: fn(&Variation) -> Estimate,
+) -> OnScenes {
+    let chosen = seen.iter().filter(|v| which(v.aspect));
+    OnScenes(chosen.map(|v| (v.scene.to_string(), of(v))).collect())
+}
+
+/// The same in frames of a size other than the rest has.
+fn sized(seen: &[Variation], side: u32, of: fn(&Variation) -> Estimate) -> OnScenes {
+    seen_as(seen, |aspect| aspect == Aspect::Size(side), of)
+}
+
+/// On which scenes `enderton` gains less on `naive` in frames of half the side than in those
+/// of twice the side.
+fn more_in_small_frames(seen: &[Variation], side: u32) -> Holding {
+    let large = sized(seen, 2 * side, enderton_to_naive);
+    let small = sized(seen, side / 2, enderton_to_naive);
+    let pairs = large.0.iter().filter_map(|(name, large)| {
+        let (_, small) = small.0.iter().find(|(other, _)| other == name)?;
+        Some((name.as_str(), small.value > large.value))
     });
-    changes.fold(0.0, f64::max)
+    holding(pairs)
+}
+
+/// `lk` ÷ `enderton` with the triangles in some order.
+struct InOrder(OnScenes);
+
+fn in_order(seen: &[Variation], order: Order) -> InOrder {
+    let which = |a| [Aspect::Nothing(order), Aspect::Order(order)].contains(&a);
+    InOrder(seen_as(seen, which, lk_to_enderton))
+}
+
+impl InOrder {
+    /// The range, and on how many scenes `lk` has the smaller error, and on which the greater.
+    fn words(&self) -> String {
+        let InOrder(list) = self;
+        if list.0.is_empty() {
+            return "not measured".to_string();
+        }
+        let worse = list.holding(|e| !above(e, 1.0)).but;
+        let worse = match worse.len() {
+            0 => "above it on none".to_string(),
+            n => format!("above it on {n}: {}", worse.join(", ")),
+        };
+        let (below, all) = (list.below(1.0), list.0.len());
+        format!(
+            "{}, below 1 by more than its interval on {below} of {all} scenes, {worse}",
+            list.range()
+        )
+    }
+}
+
+/// The largest relative change of `lk ÷ enderton` with angle and background, and where.
+fn change_of_view(seen: &[Variation]) -> String {
+    let ratio = |v: &Variation| lk_to_enderton(v).value;
+    let changes = seen.iter().filter_map(|v| {
+        let base = |b: &&Variation| b.scene == v.scene && matches!(b.aspect, Aspect::Nothing(_));
+        let base = seen.iter().find(base)?;
+        let counts = matches!(v.aspect, Aspect::Angle | Aspect::Background);
+        counts.then(|| ((ratio(v) / ratio(base) - 1.0).abs(), v))
+    });
+    let most = changes.max_by(|a, b| a.0.total_cmp(&b.0));
+    most.map_or("an amount that was not measured".to_string(), |(change, v)| {
+        format!("{:.0} % at most (`{}`, {})", 100.0 * change, v.scene, v.what)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seen(scene: &'static str, aspect: Aspect, rmse: [f64; 3]) -> Variation {
+        let known = |v: f64| Estimate { value: v, low: v * 0.999, high: v * 1.001 };
+        Variation {
+            scene,
+            aspect,
+            what: "made up".to_string(),
+            fragments_per_pixel: 1.0,
+            edge_share: 0.5,
+            rmse: rmse.map(known),
+        }
+    }
+
+    #[test]
+    fn an_orders_rule_names_the_scenes_on_which_lk_is_worse() {
+        let near = Aspect::Order(Order::NearToFar);
+        let list = [
+            seen("a", near, [0.8, 1.0, 2.0]),
+            seen("b", near, [1.1, 1.0, 2.0]),
+            seen("a", Aspect::Nothing(Order::Api), [0.5, 1.0, 2.0]),
+        ];
+        assert_eq!(
+            in_order(&list, Order::NearToFar).words(),
+            "0.80 (`a`) to 1.10 (`b`), below 1 by more than its interval on 1 of 2 scenes, above it \
+             on 1: `b`"
+        );
+        let own = in_order(&list, Order::Api).words();
+        assert!(own.ends_with("on 1 of 1 scenes, above it on none"), "{own}");
+        assert_eq!(in_order(&list, Order::Random).words(), "not measured");
+    }
+
+    #[test]
+    fn small_frames_and_other_views_are_held_against_the_scene_itself() {
+        let list = [
+            seen("a", Aspect::Nothing(Order::Api), [0.8, 1.0, 2.0]),
+            seen("a", Aspect::Angle, [0.88, 1.0, 2.0]),
+            seen("a", Aspect::Background, [0.8, 1.0, 2.0]),
+            seen("a", Aspect::Size(256), [0.8, 1.0, 2.0]),
+            seen("a", Aspect::Size(64), [0.8, 1.5, 2.0]),
+            seen("b", Aspect::Size(256), [0.8, 1.0, 2.0]),
+            seen("b", Aspect::Size(64), [0.8, 0.9, 2.0]),
+        ];
+        assert_eq!(more_in_small_frames(&list, 128).words(), "on 1 of 2 scenes (not on `b`)");
+        assert!(
+            change_of_view(&list).starts_with("10 % at most (`a`"),
+            "{}",
+            change_of_view(&list)
+        );
+    }
 }

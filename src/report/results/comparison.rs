@@ -3,6 +3,8 @@
 use std::fmt::Write;
 
 use crate::report::markdown_table;
+use crate::report::results::against::below;
+use crate::report::results::ratios::OnScenes;
 use crate::report::results::slab;
 use crate::study::comparison::{ComparedScene, Comparison, Duel, Outcome};
 
@@ -122,17 +124,55 @@ fn cell(r: &Outcome) -> String {
     format!("{rmse:.1} ({:+.2}{half})", mean.value)
 }
 
-/// The geometric mean over the scenes of the ratio of two contenders' errors.
-fn mean_ratio(c: &Comparison, a: usize, b: usize, count: u32) -> Option<f64> {
-    let logs: Vec<f64> = c
-        .scenes
-        .iter()
-        .filter_map(|s| {
-            let error = |i| s.result(i, count).map(|r| r.errors.rmse.value.max(1e-3));
-            Some((error(a)? / error(b)?).ln())
-        })
-        .collect();
-    (!logs.is_empty()).then(|| (logs.iter().sum::<f64>() / logs.len() as f64).exp())
+/// The ratio of two contenders' errors on every scene.
+fn ratios(c: &Comparison, a: usize, b: usize, count: u32) -> OnScenes {
+    let ratio = |s: &ComparedScene| {
+        let error = |i| s.result(i, count).map(|r| r.errors.rmse);
+        Some((s.name.to_string(), error(a)?.ratio(error(b)?)))
+    };
+    OnScenes(c.scenes.iter().filter_map(ratio).collect())
+}
+
+/// `lk` and `systematic` with each method, beside `enderton` with the same.
+fn pairs(c: &Comparison) -> Vec<(String, usize, usize)> {
+    let methods = ["", ":method=alpha-correction", ":method=depth", ":method=depth-correction"];
+    let named = methods.into_iter().flat_map(|method| {
+        ["lk", "systematic"]
+            .map(|design| (format!("{design}{method}"), format!("enderton{method}")))
+    });
+    named.filter_map(|(a, b)| Some((a.clone(), c.contender(&a)?, c.contender(&b)?))).collect()
+}
+
+/// The samples at which the methods' ratios are summed up.
+const SUMMED_UP: u32 = 8;
+
+/// What LK's and systematic samples gain, in a sentence a design.
+pub(super) fn in_short(c: &Comparison) -> Vec<String> {
+    let gains = |design: &str| {
+        let own = |name: &str| name.split(':').next() == Some(design);
+        let of = pairs(c).into_iter().filter(|(name, ..)| own(name)).map(|(name, a, b)| {
+            let list = ratios(c, a, b, SUMMED_UP);
+            format!(
+                "`{name}` {:.2} (smaller {})",
+                list.mean(),
+                list.holding(|e| below(e, 1.0)).words()
+            )
+        });
+        of.collect::<Vec<_>>().join("; ")
+    };
+    let names: Vec<&str> = c.scenes.iter().map(|s| s.name).collect();
+    let line = |design: &str| {
+        format!(
+            "**`{design}` in Enderton's methods** ({}; {} × {} pixels, {} seeds): RMSE at {SUMMED_UP} \
+             samples relative to `enderton` with the same method, in the geometric mean: {}.",
+            names.join(", "),
+            c.side,
+            c.side,
+            c.seeds,
+            gains(design)
+        )
+    };
+    ["lk", "systematic"].map(line).to_vec()
 }
 
 /// What LK's and systematic sampling gain in Enderton's methods.
@@ -142,38 +182,53 @@ fn methods(text: &mut String, c: &Comparison) {
         "### LK and systematic sampling in the methods of several passes\n\n\
          LK leave it to future work to quantify what their samples gain in the methods of \
          Enderton et al. RMSE relative to `enderton` with the same method and samples, the \
-         geometric mean over the scenes; below 1 is better.\n"
+         geometric mean over the {} scenes of the tables above; at {SUMMED_UP} samples the range, and \
+         where it is below 1 by more than its interval.\n",
+        c.scenes.len()
     );
-    let mut rows = Vec::new();
-    for method in ["", ":method=alpha-correction", ":method=depth", ":method=depth-correction"] {
-        for design in ["lk", "systematic"] {
-            let pair = (
-                c.contender(&format!("{design}{method}")),
-                c.contender(&format!("enderton{method}")),
-            );
-            let (Some(a), Some(b)) = pair else { continue };
-            let mut row = vec![format!("`{design}{method}`")];
-            for count in SHOWN.into_iter().chain([32]) {
-                let ratio = mean_ratio(c, a, b, count);
-                row.push(ratio.map_or("—".to_string(), |r| format!("{r:.3}")));
-            }
-            rows.push(row);
-        }
-    }
-    text.push_str(&markdown_table(&["design", "4", "8", "16", "32"], &rows));
+    let row = |(name, a, b): (String, usize, usize)| {
+        let of = |count| ratios(c, a, b, count);
+        let mut row = vec![format!("`{name}`")];
+        row.extend(SHOWN.into_iter().chain([32]).map(|n| match of(n) {
+            list if list.0.is_empty() => "—".to_string(),
+            list => format!("{:.3}", list.mean()),
+        }));
+        let summed_up = of(SUMMED_UP);
+        row.push(summed_up.range());
+        row.push(summed_up.holding(|e| below(e, 1.0)).words());
+        row
+    };
+    let rows: Vec<Vec<String>> = pairs(c).into_iter().map(row).collect();
+    text.push_str(&markdown_table(
+        &["design", "4", "8", "16", "32", "at 8", "smaller at 8"],
+        &rows,
+    ));
     text.push('\n');
 }
 
+/// Designs that forget the order of fragments.
+const FORGETFUL: [&str; 2] = ["blend", "wboit"];
+
 /// Who has the least error within a budget of state.
 fn winners(text: &mut String, c: &Comparison) {
+    let [.., most] = BUDGETS;
+    let forgets = |s: &&ComparedScene| {
+        let winner = winner(c, s, most, false);
+        FORGETFUL.iter().any(|name| winner.starts_with(&format!("`{name}`")))
+    };
+    let forgetful: Vec<&str> = c.scenes.iter().filter(forgets).map(|s| s.name).collect();
     let _ = writeln!(
         text,
         "### Who wins within a budget\n\n\
          The design with the least RMSE among all whose state fits, at any of {} samples or \
          layers; then the best of those that read the trace once. `sorted-blend` is left out: its \
-         application does the work. (Where all colours are alike, as in smoke, what forgets the \
-         order does best.)\n",
-        crate::study::comparison::COUNTS.map(|n| n.to_string()).join(", ")
+         application does the work. What forgets the order of fragments ({}) is best with the \
+         most state on {} of {} scenes: {}.\n",
+        crate::study::comparison::COUNTS.map(|n| n.to_string()).join(", "),
+        FORGETFUL.map(|name| format!("`{name}`")).join(", "),
+        forgetful.len(),
+        c.scenes.len(),
+        if forgetful.is_empty() { "none".to_string() } else { forgetful.join(", ") }
     );
     let budgets: Vec<String> = BUDGETS.iter().map(|b| format!("{b:.0} bytes")).collect();
     let mut header = vec!["scene", "passes"];

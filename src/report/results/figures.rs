@@ -42,7 +42,7 @@ pub const FIGURES: &[Figure] = &[
         part: None,
         caption: "LK figure 1, left of each pair: `builtin:ramps` at 16 samples, `enderton` \
                   and `lk`. From the top: alpha from 0 to 1; alpha 0.61; alpha 0.75 drawn as five \
-                  quads, whose edges show on the left and leave no trace on the right.",
+                  quads.",
     },
     Figure {
         file: "figure-1-cloth",
@@ -69,9 +69,7 @@ pub const FIGURES: &[Figure] = &[
         caption: "LK figure 3: eight white layers of alpha 0.1 at 8 samples. Upper row, samples \
                   compacted and sorted: `lk2011`, `sobol`, `white`. Lower row, reference values \
                   fixed to samples as in section 3 of the paper (`sort=false,compact=false`): \
-                  `lk2011`, `sobol`, `radical-inverse`. With fixed values the Sobol' sequence \
-                  leaves the correlations of the paper's figure 3b, and the radical inverse lets \
-                  the nearest layer hide the others; the hash leaves neither.",
+                  `lk2011`, `sobol`, `radical-inverse`.",
     },
     Figure {
         file: "figure-6",

@@ -2,19 +2,24 @@
 
 mod account;
 mod against;
+mod claims;
 mod comparison;
+mod dial;
 mod examples;
 mod expectations;
 mod figures;
 mod methods;
 mod noise;
+mod ratios;
 mod slab;
+mod summary;
 mod table_1;
 
 use std::fmt::Write;
 
 pub use against::{Against, Agreement};
 pub use figures::{FIGURES, Figure};
+pub use summary::{check_marks, in_short};
 
 use crate::metrics::Estimate;
 use crate::param::Options;
@@ -22,7 +27,7 @@ use crate::picture::Picture;
 use crate::report::{markdown_table, stability};
 use crate::study::file::Publication;
 use crate::study::publications::methods::Methods;
-use crate::study::publications::{Publications, Reproduced};
+use crate::study::publications::{Publications, Reproduced, RowDifference};
 
 /// A publication's figures beside ours.
 #[derive(Clone, Debug)]
@@ -41,6 +46,7 @@ pub fn document(measured: &Reproduced, folder: &str) -> Document {
         Reproduced::LaineKarras(p) => {
             let against = vec![
                 table_1::against(p),
+                table_1::fewer_samples(p),
                 noise::figure_1(p),
                 noise::figure_3b(p),
                 noise::figure_5(p),
@@ -49,14 +55,27 @@ pub fn document(measured: &Reproduced, folder: &str) -> Document {
             (laine_karras(p, folder), against, figures::figures(p))
         }
         Reproduced::Methods(m) => {
-            let against = vec![examples::against(m), methods::figure_8_against(m)];
+            let mut against = vec![examples::against(m), methods::figure_8_against(m)];
+            against.extend(claims::against(&m.claims));
             (methods_text(m, folder), against, figures::of(&m.pictures))
         }
-        Reproduced::Slab(c) => (slab::text(c), vec![slab::against(c)], Vec::new()),
-        Reproduced::Comparison(c) => (comparison::text(c), vec![slab::against(c)], Vec::new()),
+        Reproduced::Slab(c) => {
+            (slab::text(c), vec![slab::against(c), dial::against(&c.dial)], Vec::new())
+        }
+        Reproduced::Comparison(c) => {
+            (comparison::text(c), vec![slab::against(c), dial::against(&c.dial)], Vec::new())
+        }
         Reproduced::Stability(s) => (stability::sections(s), Vec::new(), Vec::new()),
     };
-    Document { markdown, against, figures }
+    let others = match measured {
+        Reproduced::Comparison(c) => comparison::in_short(c),
+        _ => Vec::new(),
+    };
+    let in_short = match against.is_empty() {
+        true => String::new(),
+        false => summary::of(&against, &others),
+    };
+    Document { markdown: in_short + &markdown, against, figures }
 }
 
 /// The parts of RESULTS.md, each of which can be measured on its own.
@@ -95,6 +114,7 @@ const PREAMBLE: &str = "# Results\n\n\
 fn laine_karras(p: &Publications, folder: &str) -> String {
     let mut text = String::new();
     table_1::text(&mut text, p);
+    table_1::fewer_samples_text(&mut text, p);
     account::text(&mut text, p);
     expectations::text(&mut text, p);
     noise::figure_1_text(&mut text, p, folder);
@@ -110,6 +130,7 @@ fn methods_text(m: &Methods, folder: &str) -> String {
     let mut text = String::new();
     examples::text(&mut text, m);
     methods::text(&mut text, m);
+    claims::text(&mut text, &m.claims);
     figures::show(&mut text, &m.pictures, folder, |_| true);
     text
 }
@@ -123,8 +144,8 @@ fn pixel_orders(text: &mut String, p: &Publications) {
         "## Pixel orders\n\n\
          LK section 3.1: a Morton curve gives even and odd rows different expectations. Difference \
          of the means of even and odd rows of one surface, alpha 0.1 to 0.6, 4 samples, 128 × 128 \
-         pixels, root mean square over seeds and alphas, in 8-bit units. The effect is plain in \
-         the unscrambled sequence; figure 4's hash leaves little of it:\n"
+         pixels, root mean square over seeds and alphas, in 8-bit units. {}\n",
+        morton(&p.pixel_orders)
     );
     let rows: Vec<Vec<String>> = p
         .pixel_orders
@@ -133,6 +154,24 @@ fn pixel_orders(text: &mut String, p: &Publications) {
         .collect();
     text.push_str(&markdown_table(&["design", "difference"], &rows));
     text.push('\n');
+}
+
+/// How much further apart a Morton curve puts even and odd rows than a Hilbert curve.
+fn morton(found: &[RowDifference]) -> String {
+    let of = |design: &str| found.iter().find(|o| o.design == design).map(|o| o.difference);
+    let times = |morton, hilbert| Some(of(morton)? / of(hilbert)?);
+    let bare =
+        times("lk:pixel-order=morton,reference=radical-inverse", "lk:reference=radical-inverse");
+    let hashed = times("lk:pixel-order=morton", "lk");
+    let Some((bare, hashed)) = bare.zip(hashed) else { return "Not measured.".to_string() };
+    // Twice as far is no chance: the figures are over hundreds of frames.
+    let there = |times: f64| if times > 2.0 { "the effect is there" } else { "no effect is seen" };
+    format!(
+        "Morton's difference ÷ Hilbert's is {bare:.1} in the unscrambled sequence ({}) and \
+         {hashed:.1} with figure 4's hash ({}).",
+        there(bare),
+        there(hashed)
+    )
 }
 
 fn plain(e: Estimate) -> String {
@@ -153,6 +192,26 @@ mod tests {
     use super::*;
     use crate::report::html::verification::{sections, summary};
     use crate::study::publications::{Effort, measure_publication};
+
+    #[test]
+    fn a_curve_that_parts_rows_is_told_from_one_that_does_not() {
+        let of = |design: &str, difference| RowDifference { design: design.into(), difference };
+        let list = |bare| {
+            [
+                of("lk", 0.4),
+                of("lk:pixel-order=morton", 0.4),
+                of("lk:reference=radical-inverse", 0.5),
+                of("lk:pixel-order=morton,reference=radical-inverse", bare),
+            ]
+        };
+        let [found, none] = [15.5, 0.5].map(|bare| morton(&list(bare)));
+        assert!(
+            found.contains("31.0 in the unscrambled sequence (the effect is there)"),
+            "{found}"
+        );
+        assert!(none.contains("1.0 in the unscrambled sequence (no effect is seen)"), "{none}");
+        assert_eq!(morton(&[]), "Not measured.");
+    }
 
     #[test]
     fn every_claim_has_its_section_and_every_picture_is_there() {
@@ -185,13 +244,19 @@ mod tests {
             named,
             [
                 "LK table 1",
+                "LK's 16 samples and 64",
                 "LK figure 1",
                 "LK figure 3b",
                 "LK figure 5",
                 "LK figure 6",
                 "Enderton's examples",
                 "LK figure 8",
+                "Enderton's table of masks",
+                "Dithered numbers of samples",
+                "Rounds stratified together",
+                "Rounds of hashing",
                 "Wyman's claim",
+                "SLAB's dial",
             ]
         );
     }

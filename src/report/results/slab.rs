@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use crate::report::markdown_table;
 use crate::report::results::against::{Against, Agreement};
+use crate::report::results::dial;
 use crate::study::comparison::{
     ComparedScene, Comparison, Outcome, SLAB_CLAIM, SLAB_LAYERS, SLAB_LIMIT, SLAB_RIVALS,
 };
@@ -144,6 +145,7 @@ pub(super) fn text(c: &Comparison) -> String {
     header.extend([better.as_str(), "state ÷ that of 8 samples"]);
     text.push_str(&markdown_table(&header, &rows));
     errors(&mut text, c);
+    dial::text(&mut text, &c.dial);
     text
 }
 

@@ -4,7 +4,8 @@ use std::fmt::Write;
 
 use crate::metrics::Estimate;
 use crate::report::markdown_table;
-use crate::report::results::against::{Against, Agreement, below};
+use crate::report::results::against::{Against, Agreement, above, below};
+use crate::report::results::ratios::OnScenes;
 use crate::report::results::{plain, ratio};
 use crate::study::Run;
 use crate::study::publications::{COUNTS, DESIGNS, Publications, Published, Table1};
@@ -71,6 +72,98 @@ fn ratios(table: &Table1) -> Vec<(f64, Estimate, Estimate)> {
         (paper_lk / paper_other, lk.ratio(e), lk.ratio(naive))
     };
     COUNTS.iter().zip(table.stands_for.rmse()).map(at).collect()
+}
+
+/// Samples that LK say do the work of [`MANY`].
+const FEW: u32 = 16;
+const MANY: u32 = 64;
+
+/// `lk` with few samples ÷ a comparison with many, on every scene, and the greatest such
+/// ratio that the paper prints, which it calls quite close.
+fn few_to_many(p: &Publications, other: usize) -> OnScenes {
+    let scenes = p.table_1.iter().map(|table| {
+        let (few, many) = (runs(table, FEW)[0], runs(table, MANY)[other]);
+        (table.name.to_string(), few.rmse_fine.ratio(many.rmse_fine))
+    });
+    OnScenes(scenes.collect())
+}
+
+/// The ratios that the paper's own table prints, of MOTOR and CLOTH.
+fn printed_few_to_many() -> [f64; 2] {
+    let at = |samples| COUNTS.iter().position(|n| *n == samples).expect("the table has it");
+    [Published::Motor, Published::Cloth]
+        .map(|column| column.rmse()[at(FEW)][0] / column.rmse()[at(MANY)][1])
+}
+
+/// Whether LK with few samples is as close to another design with many as the paper's own
+/// table has it.
+fn close(ratio: Estimate) -> bool {
+    let [motor, cloth] = printed_few_to_many();
+    !above(ratio, motor.max(cloth))
+}
+
+/// LK's 16 samples beside 64 of the comparison's.
+pub(super) fn fewer_samples(p: &Publications) -> Against {
+    let [to_enderton, to_naive] = [1, 2].map(|other| few_to_many(p, other));
+    let [motor, cloth] = printed_few_to_many();
+    let holds = [&to_enderton, &to_naive].map(|list| list.holding(close));
+    let statements: Vec<bool> = holds.iter().flat_map(|h| h.each.iter().copied()).collect();
+    Against {
+        section: format!("LK's {FEW} samples and {MANY}"),
+        source: "Laine and Karras 2011, section 5, table 1".to_string(),
+        printed: format!(
+            "LK with {FEW} samples is quite close to the comparison method with {MANY} (RMSE \
+             {motor:.2} times on MOTOR, {cloth:.2} times on CLOTH)."
+        ),
+        measured: format!(
+            "RMSE of `lk` at {FEW} samples ÷ that of `enderton` at {MANY}: {}; ÷ that of `naive` at \
+             {MANY}: {}.",
+            to_enderton.range(),
+            to_naive.range()
+        ),
+        agreement: Agreement::of(&statements),
+        remark: format!(
+            "As close as in the paper's table against `enderton` {}, against `naive`, which does \
+             not stratify, {}.",
+            holds[0].words(),
+            holds[1].words()
+        ),
+    }
+}
+
+/// The section.
+pub(super) fn fewer_samples_text(text: &mut String, p: &Publications) {
+    fewer_samples(p).open(text);
+    let _ = writeln!(
+        text,
+        "RMSE as in the table above, {} × {} pixels, {} seeds.\n",
+        p.effort.side, p.effort.side, p.effort.seeds
+    );
+    let row = |table: &Table1| {
+        let lk = runs(table, FEW)[0].rmse_fine;
+        let [_, e, naive] = runs(table, MANY).map(|r| r.rmse_fine);
+        vec![
+            table.name.to_string(),
+            plain(lk),
+            plain(e),
+            plain(naive),
+            ratio(lk, e),
+            ratio(lk, naive),
+        ]
+    };
+    let rows: Vec<Vec<String>> = p.table_1.iter().map(row).collect();
+    let named = |design: &str, n: u32| format!("`{design}`, {n}");
+    let header = [
+        "scene".to_string(),
+        named("lk", FEW),
+        named("enderton", MANY),
+        named("naive", MANY),
+        "lk ÷ enderton".to_string(),
+        "lk ÷ naive".to_string(),
+    ];
+    let header: Vec<&str> = header.iter().map(String::as_str).collect();
+    text.push_str(&markdown_table(&header, &rows));
+    text.push('\n');
 }
 
 /// The table's section, without the account of where it differs.
@@ -199,4 +292,21 @@ pub(super) fn runs(table: &Table1, samples: u32) -> [&Run; 3] {
 
 fn plain_srgb(r: &Run) -> String {
     format!("{:.2}", r.covered.rmse_srgb.value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn known(value: f64) -> Estimate {
+        Estimate { value, low: value - 0.01, high: value + 0.01 }
+    }
+
+    #[test]
+    fn few_samples_are_close_to_many_as_far_as_the_paper_prints() {
+        let [motor, cloth] = printed_few_to_many();
+        assert!((motor - 10.3 / 8.7).abs() < 1e-12 && (cloth - 5.6 / 4.1).abs() < 1e-12);
+        assert!(close(known(6.5 / 6.3)) && close(known(cloth)));
+        assert!(!close(known(6.5 / 3.0)) && !close(known(cloth + 0.02)));
+    }
 }

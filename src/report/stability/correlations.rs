@@ -6,6 +6,8 @@ use crate::report::markdown_table;
 use crate::study::stress::{Between, Correlation, CorrelationRow, SIGNIFICANCE, Stability};
 
 pub(super) fn text(text: &mut String, found: &Stability) {
+    let promised = found.hashes.iter().filter(|h| h.promised);
+    let promised: Vec<String> = promised.map(|h| format!("`{}`", h.name)).collect();
     let _ = writeln!(
         text,
         "## Correlations\n\n\
@@ -14,9 +16,9 @@ pub(super) fn text(text: &mut String, found: &Stability) {
          pixels over their surfaces or seeds; the largest over several distances and pixels. In bold \
          what chance alone gives anywhere in the table with a probability below {SIGNIFICANCE} \
          (Bonferroni). Pixels that follow each other on the curve share their strata, which is what \
-         LK section 3.1 wants: there a correlation is meant. `radical-inverse` and `sobol` do not \
-         scramble by the surface, and `vegdahl-v2` needs its seeds hashed first; of all others it is \
-         promised that surfaces and seeds are unrelated.\n"
+         LK section 3.1 wants: there a correlation is meant. That surfaces and seeds are unrelated is \
+         promised of: {}.\n",
+        promised.join(", ")
     );
     let columns: Vec<(Between, bool)> =
         Between::ALL.into_iter().flat_map(|b| [(b, true), (b, false)]).collect();

@@ -157,6 +157,9 @@ fn hashed<S: Simd, L: Lanes<S>, const N: usize>(
     let place = places(simd, loaded, base);
     let values = match reference {
         Reference::Lk2011 => lk2011(simd, place.add(L::splat(simd, moved as i32))),
+        Reference::Lk2011Rounds1 => rounds::<S, L, 1>(simd, place, moved),
+        Reference::Lk2011Rounds2 => rounds::<S, L, 2>(simd, place, moved),
+        Reference::Lk2011Rounds3 => rounds::<S, L, 3>(simd, place, moved),
         Reference::VegdahlV2 => vegdahl_v2(simd, place, moved),
         Reference::Vegdahl => vegdahl(simd, place, moved),
         _ => one_by_one::<S, L, N>(reference, simd, round, key),
@@ -221,6 +224,16 @@ pub fn below<S: Simd, L: Lanes<S>>(simd: S, values: L, limit: Limit) -> u64 {
 fn lk2011<S: Simd, L: Lanes<S>>(simd: S, mut x: L) -> L {
     for factor in LK2011 {
         x = x.xor(x.mul(L::splat(simd, factor as i32)));
+    }
+    x
+}
+
+/// The first `ROUNDS` of them.
+#[inline(always)]
+fn rounds<S: Simd, L: Lanes<S>, const ROUNDS: usize>(simd: S, place: L, moved: u32) -> L {
+    let mut x = place.add(L::splat(simd, moved as i32));
+    for factor in &LK2011[..ROUNDS] {
+        x = x.xor(x.mul(L::splat(simd, *factor as i32)));
     }
     x
 }

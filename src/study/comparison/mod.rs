@@ -14,8 +14,9 @@ use crate::design::{REFERENCE, configure};
 use crate::error::Result;
 use crate::metrics::{Ensemble, EnsembleErrors, PixelClasses};
 use crate::rop::{Frame, ReplayOptions};
-use crate::scene;
+use crate::scene::{self, Scene};
 use crate::study::comparison::contenders::claimed;
+use crate::study::publications::claims::{Trial, dial};
 use crate::trace::{Statistics, Trace, statistics};
 
 /// Samples per pixel, or layers, that every design is run with.
@@ -23,7 +24,7 @@ pub const COUNTS: [u32; 5] = [2, 4, 8, 16, 32];
 
 /// A scene of the comparison and how it is captured.
 #[derive(Clone, Copy, Debug)]
-struct SceneSpec {
+pub(in crate::study) struct SceneSpec {
     name: &'static str,
     /// A file in the models' folder, or a built-in scene.
     source: &'static str,
@@ -123,6 +124,8 @@ pub struct Comparison {
     /// The same scenes with all samples at the pixels' centres, as Enderton et al. and
     /// Wyman show theirs; with what [`SLAB_CLAIM`] is about alone.
     pub without_antialiasing: Vec<ComparedScene>,
+    /// SLAB along its dial from noise to bias, without antialiasing.
+    pub dial: Trial,
     /// Models that were not given.
     pub missing: Vec<&'static str>,
 }
@@ -179,17 +182,37 @@ fn compare_some(
             without_antialiasing.push(compared);
         }
     }
-    Ok(Comparison { side, seeds, contenders, scenes, without_antialiasing, missing })
+    progress("SLAB's dial", total, total);
+    let dial = dial(models, side, seeds)?;
+    Ok(Comparison { side, seeds, contenders, scenes, without_antialiasing, dial, missing })
 }
 
 impl SceneSpec {
+    /// Every scene that there is: the built-in ones, and the models where a folder is given.
+    pub(in crate::study) fn all(models: Option<&Path>) -> impl Iterator<Item = &'static Self> {
+        let given = if models.is_some() { MODELS.as_slice() } else { &[] };
+        given.iter().chain(&BUILT_IN)
+    }
+
+    /// A name that no other scene has.
+    pub(in crate::study) fn label(&self) -> &'static str {
+        if scene::path_of(self.source).is_none() { self.source } else { self.name }
+    }
+
     /// Its trace at 32 samples; `None` where the model is not there.
-    fn capture(
+    pub(in crate::study) fn capture(
         &self,
         models: Option<&Path>,
         side: u32,
         pattern: PatternKind,
     ) -> Result<Option<Trace>> {
+        let Some(scene) = self.load(models)? else { return Ok(None) };
+        let options = CaptureOptions { pattern, ..self.options(side) };
+        Ok(Some(Capture::new(&scene, &options)?.to_memory(|_, _| ())?))
+    }
+
+    /// The scene; `None` where the model is not there.
+    pub(in crate::study) fn load(&self, models: Option<&Path>) -> Result<Option<Scene>> {
         let in_folder = |file: &str| models.map(|m| m.join(file)).filter(|p| p.is_file());
         let source = match scene::path_of(self.source) {
             None => self.source.to_string(),
@@ -202,17 +225,20 @@ impl SceneSpec {
         if let Some(texture) = self.texture.and_then(in_folder) {
             scene.apply_texture(&texture)?;
         }
-        let options = CaptureOptions {
+        Ok(Some(scene))
+    }
+
+    /// How it is captured, in a square frame with 32 samples.
+    pub(in crate::study) fn options(&self, side: u32) -> CaptureOptions {
+        CaptureOptions {
             width: side,
             height: side,
             samples: 32,
-            pattern,
             alpha: self.alpha,
             faces: Faces::Both,
             order: self.order,
             ..CaptureOptions::default()
-        };
-        Ok(Some(Capture::new(&scene, &options)?.to_memory(|_, _| ())?))
+        }
     }
 }
 

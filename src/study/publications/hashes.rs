@@ -19,6 +19,8 @@ pub struct HashRow {
     pub reference: &'static str,
     /// Whether surface and seed are hashed first.
     pub prehash: bool,
+    /// Whether it is meant to tell surfaces apart.
+    pub scrambles: bool,
     /// Different orders of 16 consecutive reference values of a pixel, among
     /// [`TRIES`] surfaces and pixels (LK's use: the highest bits scrambled by all
     /// below); 32768 exist.
@@ -147,6 +149,7 @@ fn row(values: Values, name: &'static str, seeds: u32) -> Result<HashRow> {
     Ok(HashRow {
         reference: name,
         prehash,
+        scrambles: values.reference.scrambles(),
         orders: values.orders(),
         low_orders: values.low_orders(),
         between_surfaces: values.correlation(|n, pixel, i| values.at(n, 8, pixel, i, 0)),

@@ -9,6 +9,7 @@ use crate::capture::CaptureOptions;
 use crate::error::Result;
 use crate::metrics::{Ensemble, Estimate, PixelClasses};
 use crate::rop::{visible_independent, visible_stratified};
+use crate::study::publications::claims::{Claims, claims};
 use crate::study::publications::examples::{BiasCase, ExampleRow, bias_cases, examples};
 use crate::study::publications::hashes::{HashRow, hashes};
 use crate::study::publications::{Effort, NamedPicture, capture, replay};
@@ -29,6 +30,8 @@ pub struct Methods {
     pub hashes: Vec<HashRow>,
     /// LK figure 8.
     pub figure_8: Figure8,
+    /// Variants of Enderton's and LK's samples.
+    pub claims: Claims,
     /// Pictures by name.
     pub pictures: Vec<NamedPicture>,
 }
@@ -72,18 +75,19 @@ pub fn methods(
     effort: Effort,
     mut progress: impl FnMut(&str, u64, u64),
 ) -> Result<Methods> {
-    progress("Enderton's examples", 0, 4);
+    progress("Enderton's examples", 0, 5);
     let (examples, bias_cases) = (examples()?, bias_cases()?);
-    progress("Wyman's probabilities", 1, 4);
+    progress("Wyman's probabilities", 1, 5);
     let probabilities = probabilities();
-    progress("hashes", 2, 4);
+    progress("hashes", 2, 5);
     let hashes = match effort.brief {
         true => Vec::new(),
         false => hashes(effort.seeds_of_means.min(64))?,
     };
-    progress("LK figure 8", 3, 4);
+    progress("LK figure 8", 3, 5);
     let (figure_8, pictures) = figure_8(models, effort)?;
-    Ok(Methods { effort, examples, bias_cases, probabilities, hashes, figure_8, pictures })
+    let claims = claims(models, effort, |what| progress(what, 4, 5))?;
+    Ok(Methods { effort, examples, bias_cases, probabilities, hashes, figure_8, claims, pictures })
 }
 
 fn probabilities() -> Probabilities {

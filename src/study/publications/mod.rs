@@ -1,5 +1,6 @@
 //! The experiments of Laine and Karras 2011, on scenes that we have.
 
+pub mod claims;
 pub mod examples;
 mod figures;
 pub mod hashes;
@@ -16,7 +17,7 @@ use serde::Serialize;
 pub use figures::NamedPicture;
 pub use noise::{BLOCKS, CORRELATION_SEEDS, EdgeNoise, FigureNoise, Noise};
 pub use reproduced::{Reproduced, measure_publication};
-pub use sampling::{FarSamples, MeanError, RowDifference};
+pub use sampling::{FarSamples, MIXED, MeanError, RowDifference};
 pub use table_1::{Aspect, COUNTS, DESIGNS, Published, Table1, Variation};
 
 pub use crate::capture::Order;
@@ -40,7 +41,8 @@ pub struct Effort {
     pub seeds_of_means: u32,
     /// Frame side in pixels of table 1.
     pub side: u32,
-    /// Frame side in pixels of Wyman's claim and of the comparison of all designs.
+    /// Frame side in pixels of what all scenes are tried for: the comparison of all
+    /// designs, Wyman's claim, the views of table 1; with half of it what is said of variants.
     pub comparison_side: u32,
     /// Only what the publications print or claim, on built-in scenes: no other views, no
     /// expectations, no pixel orders, no hashes, no gallery.
@@ -64,11 +66,11 @@ pub struct Publications {
     pub table_1: Vec<Table1>,
     /// Scenes of table 1 whose models were not given.
     pub missing: Vec<&'static str>,
-    /// The ratio of table 1 as the scene is seen otherwise; none where brief.
+    /// The ratio of table 1 on every scene, seen in several ways; none where brief.
     pub variations: Vec<Variation>,
     /// Figure 5: samples left to the far surface.
     pub far_samples: Vec<FarSamples>,
-    /// Mean errors of `lk` and its ablations; none where brief.
+    /// Mean errors of `lk` and its ablations on every scene; none where brief.
     pub means: Vec<MeanError>,
     /// Row structure of the pixel orders; none where brief.
     pub pixel_orders: Vec<RowDifference>,
@@ -90,8 +92,7 @@ pub fn reproduce(
     effort: Effort,
     mut progress: impl FnMut(&str, u64, u64),
 ) -> Result<Publications> {
-    let (mut tables, mut variations, mut missing) = (Vec::new(), Vec::new(), Vec::new());
-    let mut means = Vec::new();
+    let (mut tables, mut missing) = (Vec::new(), Vec::new());
     let wanted = |spec: &&table_1::Table1Scene| !effort.brief || spec.is_built_in();
     for spec in table_1::SCENES.iter().filter(wanted) {
         let Some(source) = spec.locate(models) else {
@@ -99,16 +100,14 @@ pub fn reproduce(
             continue;
         };
         tables.push(spec.measure(&source, effort, &mut progress)?);
-        if effort.brief {
-            continue;
-        }
-        variations.extend(spec.vary(&source, effort, &mut progress)?);
-        // Expectations on the first scene in random order: there surfaces mix.
-        if spec.stands_for == Published::Cloth && means.is_empty() {
-            let trace = capture(&source, &spec.options(256), spec.white)?;
-            means = sampling::means(&trace, effort, &mut progress)?;
-        }
     }
+    let (variations, means) = match effort.brief {
+        true => (Vec::new(), Vec::new()),
+        false => (
+            table_1::vary(models, effort, &mut progress)?,
+            sampling::means(models, effort, &mut progress)?,
+        ),
+    };
     progress("figures", 0, 1);
     let (pictures, noise) = figures::figures(effort)?;
     let (pixel_orders, gallery) = match effort.brief {

@@ -1,11 +1,14 @@
 //! LK's claims about sampling: expectation, figure 5, pixel orders.
 
+use std::path::Path;
+
 use serde::Serialize;
 
-use crate::capture::CaptureOptions;
+use crate::capture::{Capture, CaptureOptions};
 use crate::design::configure;
 use crate::error::Result;
 use crate::metrics::{Ensemble, Estimate, PixelClasses};
+use crate::study::comparison::SceneSpec;
 use crate::study::publications::{Effort, capture, replay};
 use crate::trace::{Trace, tied_fragments};
 
@@ -26,6 +29,12 @@ pub struct FarSamples {
 /// The mean error of a design over many seeds.
 #[derive(Clone, Debug, Serialize)]
 pub struct MeanError {
+    /// The scene; a built-in one's name begins with `builtin:`.
+    pub scene: &'static str,
+    /// Frame side in pixels.
+    pub side: u32,
+    /// How many seeds.
+    pub seeds: u32,
     /// The design.
     pub design: String,
     /// Samples per pixel.
@@ -58,33 +67,52 @@ const MEAN_DESIGNS: [&str; 7] = [
     "enderton:mask=naive",
 ];
 
+/// The scene of which expectations are measured at several sample counts: in random order,
+/// so that surfaces mix.
+pub const MIXED: &str = "builtin:cloth";
+
+/// Mean errors on every scene that there is, at 8 samples with a quarter of the seeds; of
+/// [`MIXED`] in a larger frame, at several counts with all seeds.
 pub(super) fn means(
-    trace: &Trace,
+    models: Option<&Path>,
     effort: Effort,
     progress: &mut dyn FnMut(&str, u64, u64),
 ) -> Result<Vec<MeanError>> {
     let mut list = Vec::new();
-    let counts = [4, 8, 16, 64];
-    let total = (counts.len() * MEAN_DESIGNS.len()) as u64;
-    for samples in counts {
-        let exact = replay("exact", trace, samples, 0)?.picture;
-        let covered = PixelClasses::of(trace, samples)?.covered;
-        let tied = tied_fragments(trace, samples)?;
-        for spec in MEAN_DESIGNS {
-            progress(&format!("expectation of {spec} at {samples}"), list.len() as u64, total);
-            let mut ensemble = Ensemble::new(&exact, &[&covered]);
-            for seed in 0..effort.seeds_of_means {
-                ensemble.add(&replay(spec, trace, samples, seed)?.picture);
+    let few = (effort.seeds_of_means / 4).max(2);
+    let closely = (effort.comparison_side, effort.seeds_of_means, [4, 8, 16, 64].as_slice());
+    let briefly = (effort.claims_side(), few, [8].as_slice());
+    let mixed = SceneSpec::all(models).filter(|spec| spec.label() == MIXED);
+    let each = SceneSpec::all(models).map(|spec| (spec, briefly));
+    let all = mixed.map(|spec| (spec, closely)).chain(each);
+    let total = SceneSpec::all(models).count() as u64 + 1;
+    for (done, (spec, (side, seeds, counts))) in all.enumerate() {
+        progress(&format!("expectations: {}", spec.label()), done as u64, total);
+        let Some(scene) = spec.load(models)? else { continue };
+        let options = CaptureOptions { samples: 64, ..spec.options(side) };
+        let trace = Capture::new(&scene, &options)?.to_memory(|_, _| ())?;
+        for samples in counts {
+            let exact = replay("exact", &trace, *samples, 0)?.picture;
+            let covered = PixelClasses::of(&trace, *samples)?.covered;
+            let tied = tied_fragments(&trace, *samples)?;
+            for variant in MEAN_DESIGNS {
+                let mut ensemble = Ensemble::new(&exact, &[&covered]);
+                for seed in 0..seeds {
+                    ensemble.add(&replay(variant, &trace, *samples, seed)?.picture);
+                }
+                let design = configure(variant, &[])?;
+                let e = &ensemble.finish()[0];
+                list.push(MeanError {
+                    scene: spec.label(),
+                    side,
+                    seeds,
+                    design: design.label(),
+                    samples: *samples,
+                    unbiased: design.promises().unbiased.holds(tied),
+                    mean: e.mean,
+                    rmse: e.rmse,
+                });
             }
-            let design = configure(spec, &[])?;
-            let e = &ensemble.finish()[0];
-            list.push(MeanError {
-                design: design.label(),
-                samples,
-                unbiased: design.promises().unbiased.holds(tied),
-                mean: e.mean,
-                rmse: e.rmse,
-            });
         }
     }
     Ok(list)

@@ -4,10 +4,11 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use crate::capture::{CameraOptions, CaptureOptions, Faces, Order};
+use crate::capture::{CameraOptions, Capture, CaptureOptions, Faces, Order};
 use crate::error::Result;
 use crate::metrics::{Estimate, PixelClasses, errors};
 use crate::scene;
+use crate::study::comparison::SceneSpec;
 use crate::study::publications::{Effort, MEMORY, capture, designs, replay};
 use crate::study::{Plan, Run, measure};
 use crate::trace::{SampleMask, Statistics, Trace, statistics};
@@ -107,7 +108,7 @@ pub struct Table1 {
 /// One way to see a scene, at 16 samples.
 #[derive(Clone, Debug, Serialize)]
 pub struct Variation {
-    /// Which scene.
+    /// Which scene; a built-in one's name begins with `builtin:`.
     pub scene: &'static str,
     /// What differs.
     #[serde(skip)]
@@ -129,7 +130,7 @@ pub enum Aspect {
     Nothing(Order),
     /// From where it is seen.
     Angle,
-    /// The frame's size: its side is the table's, divided by this.
+    /// The frame's side, in pixels.
     Size(u32),
     /// The order of the triangles.
     Order(Order),
@@ -187,24 +188,29 @@ impl Table1Scene {
             runs: measured.runs.into_iter().map(|m| m.run).collect(),
         })
     }
+}
 
-    /// Runs the scene as it is seen otherwise.
-    pub fn vary(
-        &self,
-        source: &str,
-        effort: Effort,
-        progress: &mut dyn FnMut(&str, u64, u64),
-    ) -> Result<Vec<Variation>> {
-        let ways = variations(&self.options(effort.side));
+/// Every scene that there is, seen in several ways.
+///
+/// # Errors
+/// As [`crate::scene::load`] and [`crate::design::Configured::replay`].
+pub(super) fn vary(
+    models: Option<&Path>,
+    effort: Effort,
+    progress: &mut dyn FnMut(&str, u64, u64),
+) -> Result<Vec<Variation>> {
+    let mut list = Vec::new();
+    for spec in SceneSpec::all(models) {
+        let Some(scene) = spec.load(models)? else { continue };
+        let ways = variations(&spec.options(effort.comparison_side));
         let total = ways.len() as u64;
-        let mut list = Vec::new();
-        for way in ways {
-            progress(&format!("{}: {}", self.name, way.what), list.len() as u64, total);
-            let trace = capture(source, &way.options, self.white)?;
-            list.push(variation(self.name, way, &trace, effort)?);
+        for (done, way) in ways.into_iter().enumerate() {
+            progress(&format!("{}: {}", spec.label(), way.what), done as u64, total);
+            let trace = Capture::new(&scene, &way.options)?.to_memory(|_, _| ())?;
+            list.push(variation(spec.label(), way, &trace, effort)?);
         }
-        Ok(list)
     }
+    Ok(list)
 }
 
 /// One way to see a scene.
@@ -220,15 +226,19 @@ fn variations(base: &CaptureOptions) -> Vec<Way> {
     let mut add = |aspect, what: &str, options| {
         list.push(Way { aspect, what: what.to_string(), options });
     };
-    add(Aspect::Nothing(base.order), "as above", base.clone());
+    let side = base.width;
+    add(Aspect::Nothing(base.order), &format!("{side}×{side} pixels, its order"), base.clone());
     for yaw in [120.0, 210.0, 300.0] {
         let camera = CameraOptions { angle: Some([yaw, 20.0]), ..base.camera };
         add(Aspect::Angle, &format!("from {yaw}°"), CaptureOptions { camera, ..base.clone() });
     }
-    for part in [2, 4, 8] {
-        let (width, height) = (base.width / part, base.height / part);
-        let what = format!("{width}×{height} pixels");
-        add(Aspect::Size(part), &what, CaptureOptions { width, height, ..base.clone() });
+    for side in [base.width * 2, base.width / 2] {
+        let what = format!("{side}×{side} pixels");
+        add(
+            Aspect::Size(side),
+            &what,
+            CaptureOptions { width: side, height: side, ..base.clone() },
+        );
     }
     for (what, order) in [
         ("triangles in API order", Order::Api),
