@@ -53,7 +53,7 @@ impl Engine for Counting {
         }
     }
 
-    fn end_pass(&self, _: u32, _: TileGrid, _: TileId, _: &mut TileState) {}
+    fn end_pass(&self, _: u32, _: TileGrid, _: TileId, _: &mut TileState, _: Told<'_>) {}
 
     fn resolve(&self, _: TileGrid, _: TileId, state: &TileState) -> TilePixels {
         let [count, bits] = state.downcast_ref::<[u64; 2]>().expect("it is this engine's own");

@@ -4,10 +4,10 @@
 
 use crate::error::Result;
 use crate::param::{Param, Values};
-use crate::rop::layers::{COVERAGE, LAYERS, Layer, Layering, composite, contents};
+use crate::rop::layers::{COVERAGE, DEPTH_BITS, LAYERS, Layer, Layering, composite, contents};
 use crate::rop::{
     Blueprint, Contents, Family, Frame, Info, OpaquePromise, OrderPromise, OverOpaque, Probe,
-    Promises, Site, StateBits, Transparent, over_opaque,
+    Promises, Site, StateBits, Transparent, network_comparators, over_opaque,
 };
 use crate::trace::Fragment;
 
@@ -76,7 +76,7 @@ pub struct ABufferAt<const N: usize> {
 /// A pixel.
 #[derive(Clone, Debug, Default)]
 pub struct ABufferPixel {
-    /// In API order.
+    /// In API order until the pass ends, then from near to far.
     layers: Vec<Layer>,
     /// What is blended behind them: a colour and a transmittance in each column, once
     /// there is any.
@@ -84,13 +84,6 @@ pub struct ABufferPixel {
 }
 
 impl<const N: usize> ABufferAt<N> {
-    /// The layers from near to far; of equal depths the later lies in front.
-    fn sorted(layers: &[Layer]) -> Vec<&Layer> {
-        let mut sorted: Vec<&Layer> = layers.iter().rev().collect();
-        sorted.sort_by_key(|l| l.depth);
-        sorted
-    }
-
     /// Draws a layer over what is blended.
     fn blend<P: Probe>(&self, pixel: &mut ABufferPixel, layer: &Layer, probe: &mut P) {
         pixel.blended.resize(self.layering.columns.count(), ([0.0; 3], 1.0));
@@ -143,7 +136,9 @@ impl<const N: usize> Transparent<N> for ABufferAt<N> {
                 // The first of the furthest: of equal depths the later lies in front.
                 let held = pixel.layers.iter().enumerate().rev();
                 let furthest = held.max_by_key(|(_, l)| l.depth).map(|(i, l)| (i, l.depth));
-                probe.state(32 * pixel.layers.len() as u32, 0);
+                // The greatest of all, and the new one against that.
+                probe.compared(pixel.layers.len() as u32);
+                probe.state(DEPTH_BITS * pixel.layers.len() as u32, 0);
                 if let Some((i, _)) = furthest.filter(|(_, depth)| layer.depth <= *depth) {
                     // Later layers stay behind earlier ones in the list.
                     pixel.layers.remove(i);
@@ -159,10 +154,22 @@ impl<const N: usize> Transparent<N> for ABufferAt<N> {
         }
     }
 
+    /// Sorts the layers; of equal depths the later lies in front.
+    fn end_pass<P: Probe>(
+        &self,
+        _pass: u32,
+        _site: Site,
+        pixel: &mut ABufferPixel,
+        probe: &mut P,
+    ) {
+        probe.compared(network_comparators(pixel.layers.len()) as u32);
+        pixel.layers.reverse();
+        pixel.layers.sort_by_key(|l| l.depth);
+    }
+
     fn resolve(&self, _site: Site, pixel: &ABufferPixel, behind: &[[f32; 3]; N]) -> [f64; 3] {
-        let sorted = Self::sorted(&pixel.layers);
         self.layering.columns.over(behind, |column| {
-            let (mut colour, transmittance) = composite(sorted.iter().copied(), column);
+            let (mut colour, transmittance) = composite(&pixel.layers, column);
             let Some((blended, passes)) = pixel.blended.get(column) else {
                 return (colour, transmittance);
             };

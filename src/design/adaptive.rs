@@ -15,7 +15,7 @@
 use crate::error::Result;
 use crate::param::Values;
 use crate::rop::layers::{
-    COVERAGE, Columns, LAYERS, Layer, composite, contents, insert, nearer, room,
+    COVERAGE, Columns, DEPTH_BITS, LAYERS, Layer, composite, contents, insert, nearer, room,
 };
 use crate::rop::{
     Blueprint, Contents, Family, Frame, Info, OpaquePromise, OrderPromise, OverOpaque, Probe,
@@ -81,7 +81,7 @@ impl<const N: usize> AdaptiveAt<N> {
 
     /// Removes the node whose removal changes the area least. Areas are compared as
     /// integers.
-    fn remove_least(&self, nodes: &mut Vec<Layer>) {
+    fn remove_least<P: Probe>(&self, nodes: &mut Vec<Layer>, probe: &mut P) {
         // All but the first and the last; of two nodes, the second.
         let end = (nodes.len() - 1).max(2);
         let mut passes = [1.0_f32; N];
@@ -93,6 +93,8 @@ impl<const N: usize> AdaptiveAt<N> {
         };
         let mut before = visibility(&nodes[0]);
         let mut least = (u128::MAX, 1);
+        // The least of the areas of all nodes from the second to before the end.
+        probe.compared(end as u32 - 2);
         for i in 1..end {
             let after = visibility(&nodes[i]);
             let step = u128::from(before.saturating_sub(after));
@@ -137,19 +139,20 @@ impl<const N: usize> Transparent<N> for AdaptiveAt<N> {
             let node = Layer { colour: [0.0; 3], ..layer };
             insert(&mut pixel.nodes, self.nodes + 1, node, self.bits, probe);
             if pixel.nodes.len() > self.nodes {
-                self.remove_least(&mut pixel.nodes);
+                self.remove_least(&mut pixel.nodes, probe);
                 // All are read; those from the removed one on move back.
                 let bits = self.bits * self.nodes as u32;
                 probe.state(bits, bits);
             }
             return;
         }
-        let nearer = &pixel.nodes[..nearer(&pixel.nodes, layer.depth)];
+        let nearer = &pixel.nodes[..nearer(&pixel.nodes, layer.depth, probe)];
         let visible: f64 = layer.coverage.iter().map(|s| composite(nearer, s).1).sum();
         for (sum, c) in pixel.colour.iter_mut().zip(layer.colour) {
             *sum += c * visible as f32;
         }
-        probe.state(self.bits * pixel.nodes.len() as u32 + Self::COLOUR_BITS, Self::COLOUR_BITS);
+        let unread = self.bits - DEPTH_BITS;
+        probe.state(unread * pixel.nodes.len() as u32 + Self::COLOUR_BITS, Self::COLOUR_BITS);
     }
 
     fn resolve(&self, _site: Site, pixel: &AdaptivePixel, behind: &[[f32; 3]; N]) -> [f64; 3] {
@@ -171,6 +174,7 @@ impl<const N: usize> Transparent<N> for AdaptiveAt<N> {
 mod tests {
     use super::*;
     use crate::design::configure;
+    use crate::rop::NoProbe;
     use crate::trace::{SampleMask, Unorm32};
 
     #[test]
@@ -185,14 +189,14 @@ mod tests {
         };
         // Steps from visibility 0.5 on: 0.25 over 100, 0.125 over 100; the last stays.
         let mut nodes = vec![node(0, 0.5), node(100, 0.5), node(200, 0.5), node(201, 0.9)];
-        design.remove_least(&mut nodes);
+        design.remove_least(&mut nodes, &mut NoProbe);
         assert_eq!(nodes, [node(0, 0.5), node(100, 0.25), node(201, 0.9)]);
         // 0.25 over 10 is less than 0.125 over 90.
         let mut nodes = vec![node(0, 0.5), node(10, 0.5), node(100, 0.5), node(201, 0.9)];
-        design.remove_least(&mut nodes);
+        design.remove_least(&mut nodes, &mut NoProbe);
         assert_eq!(nodes, [node(0, 0.25), node(100, 0.5), node(201, 0.9)]);
         let mut nodes = vec![node(0, 0.5), node(10, 0.5)];
-        design.remove_least(&mut nodes);
+        design.remove_least(&mut nodes, &mut NoProbe);
         assert_eq!(nodes, [node(0, 0.25)]);
     }
 }

@@ -163,6 +163,8 @@ impl<const N: usize> Transparent<N> for DepthPeelingAt<N> {
                 written.insert(s);
             }
         }
+        // Both tests, whatever the first finds.
+        probe.compared(2 * fragment.coverage.count());
         probe.written(written);
         let counter = self.key_bits() - 32;
         probe.state(
@@ -172,7 +174,13 @@ impl<const N: usize> Transparent<N> for DepthPeelingAt<N> {
     }
 
     /// Blends what the pass has found behind what is peeled already.
-    fn end_pass(&self, _pass: u32, _site: Site, pixel: &mut Peeled<N>) {
+    fn end_pass<P: Probe>(
+        &self,
+        _pass: u32,
+        _site: Site,
+        pixel: &mut Peeled<N>,
+        _probe: &mut P,
+    ) {
         pixel.seen = 0;
         for sample in &mut pixel.samples {
             let Some(Candidate { key, colour, alpha }) = sample.candidate.take() else {

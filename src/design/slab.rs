@@ -37,8 +37,8 @@ use crate::error::Result;
 use crate::param::{Param, Values};
 use crate::random::hash;
 use crate::rop::layers::{
-    self, COVERAGE, Columns, Coverage, Deep, LAYERS, Layer, composite, contents, insert, nearer,
-    room,
+    self, COVERAGE, Columns, Coverage, DEPTH_BITS, Deep, LAYERS, Layer, composite, contents,
+    nearer, room,
 };
 use crate::rop::{
     Blueprint, Contents, Declaration, Family, Frame, Info, Normalise, OnDevice, OpaquePromise,
@@ -327,19 +327,26 @@ impl<const N: usize> SlabAt<N> {
 
     fn enter<P: Probe>(&self, site: Site, pixel: &mut SlabPixel, f: &Fragment, probe: &mut P) {
         let layers = &mut pixel.layers;
-        let place = nearer(layers, f.depth.z);
+        let place = nearer(layers, f.depth.z, probe);
         if place == self.room {
-            return probe.state(32 * place as u32, 0);
+            return;
         }
-        probe.state((self.layer_bits - 32) * place as u32, 0);
+        let unread = self.layer_bits - DEPTH_BITS;
+        if self.bits != 0 {
+            // What lies before decides whether it enters.
+            probe.state(unread * place as u32, 0);
+        }
         let Some(layer) = self.layer(site, &layers[..place], f, probe) else {
             return;
         };
-        insert(layers, self.room + 1, layer, self.layer_bits, probe);
+        // What lies behind moves, if it stays.
+        probe.state(unread * (layers.len() - place) as u32, 0);
+        layers.insert(place, layer);
         if self.hidden == Hidden::Removed && self.opacity == Opacity::Discrete {
             self.remove_hidden(layers);
         }
         layers.truncate(self.room);
+        probe.state(0, self.layer_bits * layers.len().saturating_sub(place) as u32);
         probe.written(f.coverage);
     }
 }
@@ -372,10 +379,10 @@ impl<const N: usize> Transparent<N> for SlabAt<N> {
             return self.enter(site, pixel, fragment, probe);
         }
         let (coverage, alpha) = self.columns.place(fragment);
-        let before = &pixel.layers[..nearer(&pixel.layers, fragment.depth.z)];
         let visible = if self.normalise.by_depth() {
-            probe.state(self.layer_bits * pixel.layers.len() as u32, 0);
-            coverage.iter().map(|s| self.through(before, s).1).sum()
+            let place = nearer(&pixel.layers, fragment.depth.z, probe);
+            probe.state((self.layer_bits - DEPTH_BITS) * pixel.layers.len() as u32, 0);
+            coverage.iter().map(|s| self.through(&pixel.layers[..place], s).1).sum()
         } else {
             0.0
         };

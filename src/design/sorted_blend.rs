@@ -15,7 +15,7 @@ use crate::error::Result;
 use crate::param::Values;
 use crate::rop::over_opaque;
 use crate::rop::{
-    BlendBuffer, Blueprint, Contents, Family, Frame, Info, Opaque, OpaquePromise, OrderPromise,
+    BlendBuffer, Blueprint, Contents, Family, Frame, Info, NoProbe, Opaque, OpaquePromise, OrderPromise,
     OverOpaque, PrimitiveDepths, Probe, Promises, Site, StateBits, Transparent,
 };
 use crate::trace::{Fragment, SampleMask};
@@ -111,7 +111,14 @@ impl<const N: usize> Transparent<N> for SortedBlendAt<N> {
     }
 
     /// A stable sort: what is equally deep is drawn in API order.
-    fn end_pass(&self, _pass: u32, _site: Site, waiting: &mut Vec<Waiting>) {
+    fn end_pass<P: Probe>(
+        &self,
+        _pass: u32,
+        _site: Site,
+        waiting: &mut Vec<Waiting>,
+        _probe: &mut P,
+    ) {
+        // The application sorts, before anything reaches the hardware.
         waiting.sort_by_key(|f| Reverse(f.key));
     }
 
@@ -121,7 +128,7 @@ impl<const N: usize> Transparent<N> for SortedBlendAt<N> {
 
     fn contents(&self, waiting: &Vec<Waiting>) -> Contents {
         let mut so_far = waiting.clone();
-        self.end_pass(0, Site { x: 0, y: 0 }, &mut so_far);
+        self.end_pass(0, Site { x: 0, y: 0 }, &mut so_far, &mut NoProbe);
         Self::blended(&so_far).contents()
     }
 

@@ -116,8 +116,17 @@ pub trait Design: Send + Sync {
         probe: &mut P,
     );
 
-    /// Is called when all fragments of a pass have been drawn.
-    fn end_pass(&self, _pass: u32, _site: Site, _pixel: &mut Self::Pixel) {}
+    /// Is called when all fragments of a pass have been drawn. `probe` is told what is
+    /// compared; state that is read and written once a pixel, here and to resolve it, is
+    /// not counted.
+    fn end_pass<P: Probe>(
+        &self,
+        _pass: u32,
+        _site: Site,
+        _pixel: &mut Self::Pixel,
+        _probe: &mut P,
+    ) {
+    }
 
     /// The pixel's linear colour over the background.
     fn resolve(&self, site: Site, pixel: &Self::Pixel) -> [f64; 3];

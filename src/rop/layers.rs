@@ -12,6 +12,9 @@ use crate::rop::event::Probe;
 use crate::rop::port::{Declaration, OnDevice, PixelWords};
 use crate::trace::{Fragment, SampleMask, Unorm32};
 
+/// Bits of a layer's depth.
+pub const DEPTH_BITS: u32 = 32;
+
 /// How many layers a pixel keeps.
 pub const LAYERS: Param =
     Param::integer("layers", "8", (1, 32), "the most layers that a pixel keeps");
@@ -173,9 +176,13 @@ impl Layer {
     }
 }
 
-/// How many of a sorted list lie strictly before `depth`.
+/// How many of a sorted list lie strictly before `depth`, which is told to be compared
+/// with all of it: all depths are read.
 #[inline]
-pub fn nearer<T: Deep>(list: &[T], depth: Unorm32) -> usize {
+pub fn nearer<T: Deep, P: Probe>(list: &[T], depth: Unorm32, probe: &mut P) -> usize {
+    let held = list.len() as u32;
+    probe.compared(held);
+    probe.state(DEPTH_BITS * held, 0);
     // Lists are short, and most fragments are tested against all of one.
     list.iter().take_while(|l| l.depth() < depth).count()
 }
@@ -189,13 +196,12 @@ pub fn insert<T: Deep, P: Probe>(
     bits: u32,
     probe: &mut P,
 ) -> Option<T> {
-    let place = nearer(list, layer.depth());
+    let place = nearer(list, layer.depth(), probe);
     let held = list.len();
-    // All depths are read; what lies behind the new layer moves by one.
+    // What lies behind the new layer moves by one.
     let moved = (held - place) as u32;
     let written = (room.min(held + 1) - place) as u32;
-    probe.compared(held as u32);
-    probe.state(32 * held as u32 + (bits - 32) * moved, bits * written);
+    probe.state((bits - DEPTH_BITS) * moved, bits * written);
     list.insert(place, layer);
     (list.len() > room).then(|| list.pop()).flatten()
 }

@@ -32,7 +32,9 @@ pub use design::{
     StateBits,
 };
 pub use dither::{BAYER, BLUE_NOISE, Dither, Ranks, TILE};
-pub use event::{EventCounts, NoProbe, Probe, Record, ReferenceRecord};
+pub use event::{
+    Event, EventCounts, Listen, NoProbe, Probe, Record, ReferenceRecord, network_comparators,
+};
 pub use moments::{MomentCount, Moments};
 pub use normalise::{Normalise, Sums};
 pub use opacity::Threshold;

@@ -60,7 +60,14 @@ pub trait Transparent<const N: usize>: Send + Sync {
     );
 
     /// As [`Design::end_pass`].
-    fn end_pass(&self, _pass: u32, _site: Site, _pixel: &mut Self::Pixel) {}
+    fn end_pass<P: Probe>(
+        &self,
+        _pass: u32,
+        _site: Site,
+        _pixel: &mut Self::Pixel,
+        _probe: &mut P,
+    ) {
+    }
 
     /// The pixel's linear colour over the opaque picture's samples `behind`.
     fn resolve(&self, site: Site, pixel: &Self::Pixel, behind: &[[f32; 3]; N]) -> [f64; 3];
@@ -179,9 +186,15 @@ impl<T: Transparent<N>, const N: usize> Design for OverOpaque<T, N> {
         }
     }
 
-    fn end_pass(&self, pass: u32, site: Site, pixel: &mut Self::Pixel) {
+    fn end_pass<P: Probe>(
+        &self,
+        pass: u32,
+        site: Site,
+        pixel: &mut Self::Pixel,
+        probe: &mut P,
+    ) {
         if let Some(pass) = pass.checked_sub(self.own_passes()) {
-            self.inner.end_pass(pass, site, &mut pixel.inner);
+            self.inner.end_pass(pass, site, &mut pixel.inner, probe);
         }
     }
 

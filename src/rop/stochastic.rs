@@ -427,7 +427,13 @@ impl<S: Sampler<N>, const N: usize> Transparent<N> for Methods<S, N> {
     }
 
     /// Adds a finished round to the sums.
-    fn end_pass(&self, pass: u32, site: Site, pixel: &mut Self::Pixel) {
+    fn end_pass<P: Probe>(
+        &self,
+        pass: u32,
+        site: Site,
+        pixel: &mut Self::Pixel,
+        _probe: &mut P,
+    ) {
         let MethodsPixel { samples, state, sums: Some(sums) } = pixel else { return };
         let round = match (self.pass(pass), self.method.depth_based()) {
             (Pass::Sample(round), false) | (Pass::Accumulate(round), true) => round,

@@ -75,7 +75,7 @@ impl Engine for Fast {
         }));
     }
 
-    fn end_pass(&self, _pass: u32, _grid: TileGrid, _tile: TileId, _state: &mut TileState) {}
+    fn end_pass(&self, _: u32, _: TileGrid, _: TileId, _: &mut TileState, _: Told<'_>) {}
 
     fn resolve(&self, _grid: TileGrid, _tile: TileId, state: &TileState) -> Box<Pixels> {
         let layers = state.downcast_ref::<Vec<Layer>>().expect("the state is the engine's own");
