@@ -14,7 +14,7 @@ use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
 use screendoor::picture::TilePixels;
 use screendoor::rop::{
-    Contents, Engine, Frame, ReplayOptions, Replayed, StateBits, TileState, Told, replay,
+    Contents, Engine, Frame, Layout, ReplayOptions, Replayed, TileState, Told, replay,
 };
 use screendoor::tile::{TILE_PIXELS, TileGrid, TileId};
 use screendoor::trace::{Block, Trace};
@@ -32,8 +32,8 @@ impl Engine for Counting {
         1
     }
 
-    fn state_bits(&self) -> StateBits {
-        StateBits::default()
+    fn layout(&self) -> Layout {
+        Layout::default()
     }
 
     fn bytes_per_fragment(&self) -> Option<usize> {

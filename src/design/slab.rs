@@ -41,9 +41,10 @@ use crate::rop::layers::{
     nearer, room,
 };
 use crate::rop::{
-    Blueprint, Contents, Declaration, Family, Frame, Info, Normalise, OnDevice, OpaquePromise,
-    OrderPromise, OverOpaque, PixelWords, Port, Probe, Promises, Site, StateBits, Sums, Threshold,
-    Transparent, over_opaque, random_subset, visible_independent, visible_stratified,
+    Blueprint, Contents, Declaration, Family, Frame, Info, Layout, Normalise, OnDevice,
+    OpaquePromise, OrderPromise, OverOpaque, PixelWords, Port, Probe, Promises, Site, Sums,
+    Threshold, Transparent, colour, over_opaque, random_subset, visible_independent,
+    visible_stratified,
 };
 use crate::trace::{Fragment, SampleMask, Unorm32};
 
@@ -94,6 +95,7 @@ impl Blueprint for Slab {
             Param::choice::<Hidden>("hidden", "kept", "what becomes of layers wholly hidden"),
             Param::flag("weigh", false, "divide alpha by the probability to enter (continuous)"),
             COVERAGE,
+            colour::PARAM,
         ],
         combinations: &[
             "opacity=discrete,normalise=none",
@@ -108,9 +110,8 @@ impl Blueprint for Slab {
     type At<const N: usize> = OverOpaque<SlabAt<N>, N>;
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
-        let (columns, bits) = (Columns::of(values), values.integer("bits") as u32);
+        let (columns, bits) = (Columns::of(values, frame), values.integer("bits") as u32);
         let opacity = if bits == 0 { Opacity::Continuous } else { values.choice("opacity") };
-        let opacity_bits = if opacity == Opacity::Discrete { bits } else { 32 };
         let inner = SlabAt {
             columns,
             seed: frame.seed,
@@ -121,9 +122,8 @@ impl Blueprint for Slab {
             normalise: values.choice("normalise"),
             hidden: values.choice("hidden"),
             weigh: values.flag("weigh"),
-            layer_bits: 32 + columns.mask_bits() + frame.colour_bits + opacity_bits,
         };
-        Ok(OverOpaque::new(frame, over_opaque::of(values), inner))
+        Ok(OverOpaque::new(values, frame, over_opaque::of(values), inner))
     }
 
     const PORTED: bool = true;
@@ -171,7 +171,6 @@ pub struct SlabAt<const N: usize> {
     normalise: Normalise,
     hidden: Hidden,
     weigh: bool,
-    layer_bits: u32,
 }
 
 /// A layer. With discrete opacity it is opaque where it has a bit.
@@ -196,6 +195,24 @@ pub struct SlabPixel {
 }
 
 impl<const N: usize> SlabAt<N> {
+    /// What a layer holds.
+    fn fields(&self) -> [(u32, &'static str); 4] {
+        let store = self.columns.store;
+        [
+            (DEPTH_BITS, "depth"),
+            (self.columns.mask_bits(), "coverage"),
+            (store.colour_bits(), "colour"),
+            match self.opacity {
+                Opacity::Continuous => (store.channel_bits(), "alpha"),
+                Opacity::Discrete => (self.bits, "opacity bits"),
+            },
+        ]
+    }
+
+    fn layer_bits(&self) -> u32 {
+        self.fields().iter().map(|(bits, _)| bits).sum()
+    }
+
     /// The bits that layers leave free in a column.
     fn free(&self, layers: &[SlabLayer], column: usize) -> SampleMask {
         let here = layers.iter().filter(|l| l.layer.coverage.contains(column));
@@ -282,7 +299,7 @@ impl<const N: usize> SlabAt<N> {
             let layer = Layer {
                 depth: fragment.depth.z,
                 coverage,
-                colour: fragment.colour,
+                colour: self.columns.store.colour(fragment.colour),
                 transmittance: 0.0,
             };
             let seen = coverage.iter().any(|s| !(self.free(before, s) & bits).is_empty());
@@ -303,11 +320,11 @@ impl<const N: usize> SlabAt<N> {
         }
         let alpha = (f64::from(alpha) / p) as f32;
         Some(SlabLayer {
-            layer: Layer {
+            layer: self.columns.stored(Layer {
                 colour: fragment.colour.map(|c| c * alpha),
                 transmittance: 1.0 - alpha,
                 ..whole.layer
-            },
+            }),
             ..whole
         })
     }
@@ -331,7 +348,7 @@ impl<const N: usize> SlabAt<N> {
         if place == self.room {
             return;
         }
-        let unread = self.layer_bits - DEPTH_BITS;
+        let unread = self.layer_bits() - DEPTH_BITS;
         if self.bits != 0 {
             // What lies before decides whether it enters.
             probe.state(unread * place as u32, 0);
@@ -346,7 +363,7 @@ impl<const N: usize> SlabAt<N> {
             self.remove_hidden(layers);
         }
         layers.truncate(self.room);
-        probe.state(0, self.layer_bits * layers.len().saturating_sub(place) as u32);
+        probe.state(0, self.layer_bits() * layers.len().saturating_sub(place) as u32);
         probe.written(f.coverage);
     }
 }
@@ -358,9 +375,9 @@ impl<const N: usize> Transparent<N> for SlabAt<N> {
         if self.normalise == Normalise::None { 1 } else { 2 }
     }
 
-    fn state_bits(&self) -> StateBits {
-        let sums = self.normalise.state_bits(self.columns.count());
-        StateBits { samples: 0, extra: self.room as u32 * self.layer_bits + sums, unbounded: false }
+    fn layout(&self) -> Layout {
+        let sums = self.normalise.layout(self.columns.count() as u32, self.columns.store);
+        Layout::of(self.room as u32, &self.fields()).joined(sums)
     }
 
     fn clear(&self, _site: Site) -> SlabPixel {
@@ -381,15 +398,17 @@ impl<const N: usize> Transparent<N> for SlabAt<N> {
         let (coverage, alpha) = self.columns.place(fragment);
         let visible = if self.normalise.by_depth() {
             let place = nearer(&pixel.layers, fragment.depth.z, probe);
-            probe.state((self.layer_bits - DEPTH_BITS) * pixel.layers.len() as u32, 0);
+            probe.state((self.layer_bits() - DEPTH_BITS) * pixel.layers.len() as u32, 0);
             coverage.iter().map(|s| self.through(&pixel.layers[..place], s).1).sum()
         } else {
             0.0
         };
         let columns = self.columns.count();
-        pixel.sums.add(self.normalise, columns, coverage, fragment.colour, alpha, visible);
+        let store = self.columns.store;
+        let colour = fragment.colour;
+        pixel.sums.add(self.normalise, store, columns, coverage, colour, alpha, visible);
         probe.written(fragment.coverage);
-        let bits = self.normalise.touched_bits(coverage.count());
+        let bits = self.normalise.layout(coverage.count(), store).bits().total();
         probe.state(bits, bits);
     }
 

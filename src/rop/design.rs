@@ -9,6 +9,7 @@ use crate::error::Result;
 use crate::param::{Param, Values};
 use crate::rop::event::Probe;
 use crate::rop::fast::{Count, Width};
+use crate::rop::layout::Layout;
 use crate::rop::over_opaque::{self, Opaque};
 use crate::rop::port::Port;
 use crate::rop::primitive_depths::PrimitiveDepths;
@@ -30,12 +31,16 @@ pub struct Frame {
     pub seed: u32,
     /// Bits that a stored colour takes.
     pub colour_bits: u32,
+    /// Whether opaque fragments (alpha 1) may come. Where none do, nothing is kept for them.
+    pub opaque: bool,
     /// The primitives' mean depths, for a design that asks for them.
     pub primitive_depths: Option<Arc<PrimitiveDepths>>,
 }
 
 impl Frame {
-    /// The frame of a replay of `trace` at `samples` samples.
+    /// The frame of a replay of `trace` at `samples` samples; that there are opaque
+    /// fragments is taken for granted, as is that nobody asks for the primitives' depths:
+    /// [`crate::design::Configured::frame`] finds out.
     ///
     /// # Errors
     /// As [`crate::trace::SamplePattern::prefix`].
@@ -50,6 +55,7 @@ impl Frame {
                 ColourFormat::F16 => 48,
                 ColourFormat::F32 => 96,
             },
+            opaque: true,
             primitive_depths: None,
         })
     }
@@ -100,8 +106,8 @@ pub trait Design: Send + Sync {
         1
     }
 
-    /// The bits of state that a pixel takes in hardware.
-    fn state_bits(&self) -> StateBits;
+    /// What a pixel holds in hardware, bit for bit.
+    fn layout(&self) -> Layout;
 
     /// A pixel's state before the first fragment.
     fn clear(&self, site: Site) -> Self::Pixel;

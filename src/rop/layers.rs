@@ -7,8 +7,10 @@
 //! sample, or a single one where coverage is but a share of alpha.
 
 use crate::param::{Param, Values};
-use crate::rop::design::{Contents, Frame, Site, StateBits};
+use crate::rop::colour::ColourStore;
+use crate::rop::design::{Contents, Frame, Site};
 use crate::rop::event::Probe;
+use crate::rop::layout::Layout;
 use crate::rop::port::{Declaration, OnDevice, PixelWords};
 use crate::trace::{Fragment, SampleMask, Unorm32};
 
@@ -40,12 +42,15 @@ pub const COVERAGE: Param =
 #[derive(Clone, Copy, Debug)]
 pub struct Columns<const N: usize> {
     coverage: Coverage,
+    /// How layers store their colours, and one minus alpha beside them.
+    pub store: ColourStore,
 }
 
 impl<const N: usize> Columns<N> {
-    /// As the parameter [`COVERAGE`] says.
-    pub fn of(values: &Values) -> Self {
-        Columns { coverage: values.choice(COVERAGE.name) }
+    /// As the parameters [`COVERAGE`] and [`crate::rop::colour::PARAM`] say.
+    pub fn of(values: &Values, frame: &Frame) -> Self {
+        let store = ColourStore::of(values, frame);
+        Columns { coverage: values.choice(COVERAGE.name), store }
     }
 
     /// How many there are.
@@ -81,12 +86,32 @@ impl<const N: usize> Columns<N> {
     #[inline]
     pub fn layer(self, fragment: &Fragment) -> Layer {
         let (coverage, alpha) = self.place(fragment);
-        Layer {
+        self.stored(Layer {
             depth: fragment.depth.z,
             coverage,
             colour: fragment.colour.map(|c| c * alpha),
             transmittance: 1.0 - alpha,
+        })
+    }
+
+    /// A layer as it is stored.
+    #[inline]
+    pub fn stored(self, layer: Layer) -> Layer {
+        Layer {
+            colour: self.store.colour(layer.colour),
+            transmittance: self.store.channel(layer.transmittance),
+            ..layer
         }
+    }
+
+    /// What a whole layer holds.
+    fn fields(self) -> [(u32, &'static str); 4] {
+        [
+            (DEPTH_BITS, "depth"),
+            (self.mask_bits(), "coverage"),
+            (self.store.colour_bits(), "colour"),
+            (self.store.channel_bits(), "alpha"),
+        ]
     }
 
     /// The mean over the columns of what `column` gives: the colour that lies before
@@ -222,8 +247,8 @@ impl<const N: usize> Layering<N> {
     /// As the parameters [`LAYERS`] and [`COVERAGE`] say: layers of a depth, a mask, a
     /// colour and an alpha.
     pub fn of(values: &Values, frame: &Frame) -> Self {
-        let columns = Columns::of(values);
-        let bits = 32 + columns.mask_bits() + frame.colour_bits + 32;
+        let columns = Columns::of(values, frame);
+        let bits = columns.fields().iter().map(|(bits, _)| bits).sum();
         Layering { columns, room: room(values), bits }
     }
 
@@ -237,9 +262,9 @@ impl<const N: usize> Layering<N> {
         insert(layers, self.room, layer, self.bits, probe)
     }
 
-    /// The state of all layers and `extra` bits.
-    pub fn state_bits(&self, extra: u32) -> StateBits {
-        StateBits { samples: 0, extra: self.room as u32 * self.bits + extra, unbounded: false }
+    /// What all layers hold.
+    pub fn layout(&self) -> Layout {
+        Layout::of(self.room as u32, &self.columns.fields())
     }
 
     /// The layers, near to far, over what lies behind them.

@@ -14,8 +14,8 @@ use screendoor::metrics::{Ensemble, Region, errors, student_t};
 use screendoor::param::Values;
 use screendoor::random::{Stream, hash};
 use screendoor::rop::{
-    Blueprint, Contents, Design, Family, Frame, Info, OpaquePromise, OrderPromise, Probe, Promises,
-    Samples, Site, StateBits, Threshold,
+    Blueprint, Contents, Design, Family, Frame, Info, Layout, OpaquePromise, OrderPromise, Probe,
+    Promises, Samples, Site, Threshold,
 };
 use screendoor::tile::TileGrid;
 use screendoor::trace::{DepthPlane, Fragment, Header, SampleMask, Trace, Unorm32};
@@ -213,8 +213,8 @@ impl Blueprint for Planted {
 
 impl Design for PlantedAt {
     type Pixel = Samples<8>;
-    fn state_bits(&self) -> StateBits {
-        StateBits::default()
+    fn layout(&self) -> Layout {
+        Layout::default()
     }
     fn clear(&self, _: Site) -> Samples<8> {
         Samples::cleared(self.frame.background)

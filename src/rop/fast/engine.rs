@@ -4,13 +4,14 @@ use fearless_simd::{Level, Simd};
 
 use crate::picture::TilePixels;
 use crate::resolve::box_filter;
-use crate::rop::design::{Contents, Design, Frame, Site, StateBits};
+use crate::rop::design::{Contents, Design, Frame, Site};
 use crate::rop::event::{NoProbe, Probe, Sum};
 use crate::rop::fast::kernel;
 use crate::rop::fast::lanes::{Count, Lanes, Width};
 use crate::rop::fast::references::Limit;
 use crate::rop::fast::state::{FastTile, PlainPixel, boxed};
 use crate::rop::fast::tally::Tally;
+use crate::rop::layout::Layout;
 use crate::rop::over_opaque::Transparent;
 use crate::rop::replay::{Engine, Listener, TileState, Told, sites};
 use crate::rop::stochastic::{Pass, Round, Sampler, Stochastic};
@@ -215,13 +216,7 @@ where
         tile.set(&self.sampler, within, pixel);
     }
 
-    fn draw_all<P: Sum>(
-        &self,
-        pass: u32,
-        tile: &mut FastTile<F, N>,
-        block: &Block,
-        probe: &mut P,
-    ) {
+    fn draw_all<P: Sum>(&self, pass: u32, tile: &mut FastTile<F, N>, block: &Block, probe: &mut P) {
         let methods = &self.plain.inner;
         let Some(inner) = pass.checked_sub(self.plain.own_passes()) else {
             for fragment in block.iter() {
@@ -312,8 +307,8 @@ where
         Design::passes(&self.plain)
     }
 
-    fn state_bits(&self) -> StateBits {
-        Design::state_bits(&self.plain)
+    fn layout(&self) -> Layout {
+        Design::layout(&self.plain)
     }
 
     fn bytes_per_fragment(&self) -> Option<usize> {

@@ -6,6 +6,7 @@ use std::any::Any;
 use crate::picture::TilePixels;
 use crate::rop::design::{Contents, Design, Site, StateBits};
 use crate::rop::event::{Event, EventCounts, Listen, NoProbe, Probe, Record};
+use crate::rop::layout::Layout;
 use crate::tile::{TILE_PIXELS, TileGrid, TileId};
 use crate::trace::Block;
 
@@ -16,8 +17,12 @@ pub type TileState = Box<dyn Any + Send>;
 pub trait Engine: Send + Sync {
     /// As [`Design::passes`].
     fn passes(&self) -> u32;
-    /// As [`Design::state_bits`].
-    fn state_bits(&self) -> StateBits;
+    /// As [`Design::layout`].
+    fn layout(&self) -> Layout;
+    /// Its bits.
+    fn state_bits(&self) -> StateBits {
+        self.layout().bits()
+    }
     /// As [`Design::bytes_per_fragment`].
     fn bytes_per_fragment(&self) -> Option<usize>;
     /// A cleared tile.
@@ -55,8 +60,8 @@ impl<D: Design> Engine for D {
         Design::passes(self)
     }
 
-    fn state_bits(&self) -> StateBits {
-        Design::state_bits(self)
+    fn layout(&self) -> Layout {
+        Design::layout(self)
     }
 
     fn bytes_per_fragment(&self) -> Option<usize> {

@@ -19,8 +19,8 @@ mod window;
 use fearless_simd::Level;
 use rayon::prelude::*;
 
-pub(in crate::rop) use engine::{Listener, sites};
 pub use engine::{Engine, TileState, Told};
+pub(in crate::rop) use engine::{Listener, sites};
 pub use explain::{Explanation, Step, draw_pixel, explain};
 
 use crate::error::{Error, Result};
@@ -29,6 +29,7 @@ use crate::picture::{Picture, TilePixels};
 use crate::rop::design::{Frame, StateBits};
 use crate::rop::event::EventCounts;
 use crate::rop::fast::levels;
+use crate::rop::layout::Layout;
 use crate::rop::replay::group::{Group, group_tiles};
 use crate::rop::replay::window::{Window, Windows};
 use crate::tile::{TileId, TileMap};
@@ -108,6 +109,8 @@ pub struct Replayed {
     pub events: Option<EventCounts>,
     /// State per pixel.
     pub state_bits: StateBits,
+    /// How it is made up.
+    pub layout: Layout,
     /// How many times the design read the trace.
     pub passes: u32,
     /// Tiles that at least one fragment touched.
@@ -168,6 +171,7 @@ pub fn replay(
         picture: Picture::from_tiles(frame.background.map(f64::from), finished),
         events,
         state_bits: design.state_bits(),
+        layout: design.layout(),
         passes: design.passes(),
         touched_tiles,
     })
