@@ -14,7 +14,7 @@ use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
 use screendoor::picture::TilePixels;
 use screendoor::rop::{
-    Contents, Engine, Frame, ReplayOptions, Replayed, StateBits, TileState, Told, replay,
+    Contents, Engine, Frame, Layout, ReplayOptions, Replayed, TileState, Told, replay,
 };
 use screendoor::tile::{TILE_PIXELS, TileGrid, TileId};
 use screendoor::trace::{Block, Trace};
@@ -32,8 +32,8 @@ impl Engine for Counting {
         1
     }
 
-    fn state_bits(&self) -> StateBits {
-        StateBits::default()
+    fn layout(&self) -> Layout {
+        Layout::default()
     }
 
     fn bytes_per_fragment(&self) -> Option<usize> {
@@ -53,7 +53,7 @@ impl Engine for Counting {
         }
     }
 
-    fn end_pass(&self, _: u32, _: TileGrid, _: TileId, _: &mut TileState) {}
+    fn end_pass(&self, _: u32, _: TileGrid, _: TileId, _: &mut TileState, _: Told<'_>) {}
 
     fn resolve(&self, _: TileGrid, _: TileId, state: &TileState) -> TilePixels {
         let [count, bits] = state.downcast_ref::<[u64; 2]>().expect("it is this engine's own");

@@ -111,7 +111,7 @@ pub fn draw(
             time += start.elapsed();
         }
         let start = Instant::now();
-        engine.end_pass(pass, frame.grid, *tile, &mut state);
+        engine.end_pass(pass, frame.grid, *tile, &mut state, Told::Nobody);
         time += start.elapsed();
     }
     if work == Work::Picture {

@@ -4,10 +4,10 @@
 
 use crate::error::Result;
 use crate::param::{Param, Values};
-use crate::rop::layers::{COVERAGE, LAYERS, Layer, Layering, composite, contents};
+use crate::rop::layers::{COVERAGE, DEPTH_BITS, LAYERS, Layer, Layering, composite, contents};
 use crate::rop::{
-    Blueprint, Contents, Family, Frame, Info, OpaquePromise, OrderPromise, OverOpaque, Probe,
-    Promises, Site, StateBits, Transparent, over_opaque,
+    Blueprint, Contents, Family, Frame, Info, Layout, OpaquePromise, OrderPromise, OverOpaque,
+    Probe, Promises, Site, Transparent, colour, network_comparators, over_opaque,
 };
 use crate::trace::Fragment;
 
@@ -34,6 +34,7 @@ impl Blueprint for ABuffer {
             LAYERS,
             Param::choice::<Overflow>("overflow", "newest", "what a full list does"),
             COVERAGE,
+            colour::PARAM,
         ],
         combinations: &["overflow=blend,coverage=share"],
     };
@@ -42,12 +43,8 @@ impl Blueprint for ABuffer {
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
         let layering = Layering::of(values, frame);
-        let inner = ABufferAt {
-            overflow: values.choice("overflow"),
-            column_bits: frame.colour_bits + 32,
-            layering,
-        };
-        Ok(OverOpaque::new(frame, over_opaque::of(values), inner))
+        let inner = ABufferAt { overflow: values.choice("overflow"), layering };
+        Ok(OverOpaque::new(values, frame, over_opaque::of(values), inner))
     }
 
     fn promises(values: &Values) -> Promises {
@@ -68,14 +65,12 @@ impl Blueprint for ABuffer {
 pub struct ABufferAt<const N: usize> {
     overflow: Overflow,
     layering: Layering<N>,
-    /// A colour and a transmittance of what is blended.
-    column_bits: u32,
 }
 
 /// A pixel.
 #[derive(Clone, Debug, Default)]
 pub struct ABufferPixel {
-    /// In API order.
+    /// In API order until the pass ends, then from near to far.
     layers: Vec<Layer>,
     /// What is blended behind them: a colour and a transmittance in each column, once
     /// there is any.
@@ -83,24 +78,18 @@ pub struct ABufferPixel {
 }
 
 impl<const N: usize> ABufferAt<N> {
-    /// The layers from near to far; of equal depths the later lies in front.
-    fn sorted(layers: &[Layer]) -> Vec<&Layer> {
-        let mut sorted: Vec<&Layer> = layers.iter().rev().collect();
-        sorted.sort_by_key(|l| l.depth);
-        sorted
-    }
-
     /// Draws a layer over what is blended.
     fn blend<P: Probe>(&self, pixel: &mut ABufferPixel, layer: &Layer, probe: &mut P) {
+        let store = self.layering.columns.store;
         pixel.blended.resize(self.layering.columns.count(), ([0.0; 3], 1.0));
         for column in layer.coverage.iter() {
             let (colour, transmittance) = &mut pixel.blended[column];
             for (c, l) in colour.iter_mut().zip(layer.colour) {
-                *c = l + *c * layer.transmittance;
+                *c = store.channel(l + *c * layer.transmittance);
             }
-            *transmittance *= layer.transmittance;
+            *transmittance = store.channel(*transmittance * layer.transmittance);
         }
-        let bits = self.column_bits * layer.coverage.count();
+        let bits = store.texel_bits() * layer.coverage.count();
         probe.state(bits, bits);
     }
 }
@@ -108,14 +97,17 @@ impl<const N: usize> ABufferAt<N> {
 impl<const N: usize> Transparent<N> for ABufferAt<N> {
     type Pixel = ABufferPixel;
 
-    fn state_bits(&self) -> StateBits {
+    fn layout(&self) -> Layout {
         // How many fragments the list holds.
         let count = (self.layering.room as u32).ilog2() + 1;
+        let columns = &self.layering.columns;
+        let store = columns.store;
         let blended = match self.overflow {
-            Overflow::Blend => self.layering.columns.count() as u32 * self.column_bits,
+            Overflow::Blend => columns.count() as u32,
             Overflow::Newest | Overflow::Furthest => 0,
         };
-        self.layering.state_bits(count + blended)
+        let texel = [(store.colour_bits(), "blended colour"), (store.channel_bits(), "alpha")];
+        self.layering.layout().and(1, &[(count, "count")]).and(blended, &texel)
     }
 
     fn clear(&self, _site: Site) -> ABufferPixel {
@@ -142,7 +134,9 @@ impl<const N: usize> Transparent<N> for ABufferAt<N> {
                 // The first of the furthest: of equal depths the later lies in front.
                 let held = pixel.layers.iter().enumerate().rev();
                 let furthest = held.max_by_key(|(_, l)| l.depth).map(|(i, l)| (i, l.depth));
-                probe.state(32 * pixel.layers.len() as u32, 0);
+                // The greatest of all, and the new one against that.
+                probe.compared(pixel.layers.len() as u32);
+                probe.state(DEPTH_BITS * pixel.layers.len() as u32, 0);
                 if let Some((i, _)) = furthest.filter(|(_, depth)| layer.depth <= *depth) {
                     // Later layers stay behind earlier ones in the list.
                     pixel.layers.remove(i);
@@ -158,10 +152,16 @@ impl<const N: usize> Transparent<N> for ABufferAt<N> {
         }
     }
 
+    /// Sorts the layers; of equal depths the later lies in front.
+    fn end_pass<P: Probe>(&self, _pass: u32, _site: Site, pixel: &mut ABufferPixel, probe: &mut P) {
+        probe.compared(network_comparators(pixel.layers.len()) as u32);
+        pixel.layers.reverse();
+        pixel.layers.sort_by_key(|l| l.depth);
+    }
+
     fn resolve(&self, _site: Site, pixel: &ABufferPixel, behind: &[[f32; 3]; N]) -> [f64; 3] {
-        let sorted = Self::sorted(&pixel.layers);
         self.layering.columns.over(behind, |column| {
-            let (mut colour, transmittance) = composite(sorted.iter().copied(), column);
+            let (mut colour, transmittance) = composite(&pixel.layers, column);
             let Some((blended, passes)) = pixel.blended.get(column) else {
                 return (colour, transmittance);
             };

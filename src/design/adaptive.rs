@@ -15,11 +15,11 @@
 use crate::error::Result;
 use crate::param::Values;
 use crate::rop::layers::{
-    COVERAGE, Columns, LAYERS, Layer, composite, contents, insert, nearer, room,
+    COVERAGE, Columns, DEPTH_BITS, LAYERS, Layer, composite, contents, insert, nearer, room,
 };
 use crate::rop::{
-    Blueprint, Contents, Family, Frame, Info, OpaquePromise, OrderPromise, OverOpaque, Probe,
-    Promises, Site, StateBits, Transparent, over_opaque,
+    Blueprint, Contents, Family, Frame, Info, Layout, OpaquePromise, OrderPromise, OverOpaque,
+    Probe, Promises, Site, Transparent, colour, over_opaque,
 };
 use crate::trace::Fragment;
 
@@ -32,18 +32,15 @@ impl Blueprint for Adaptive {
         family: Family::Layered,
         summary: "visibility over depth in few nodes, then a sum of all fragments by it",
         citation: "Salvi, Montgomery, Lefohn: Adaptive Transparency, HPG 2011",
-        params: &[over_opaque::PARAM, LAYERS, COVERAGE],
+        params: &[over_opaque::PARAM, LAYERS, COVERAGE, colour::PARAM],
         combinations: &[],
     };
 
     type At<const N: usize> = OverOpaque<AdaptiveAt<N>, N>;
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
-        let columns = Columns::of(values);
-        // A node is a depth, a mask and a transmittance.
-        let inner =
-            AdaptiveAt { columns, nodes: room(values), bits: 32 + columns.mask_bits() + 32 };
-        Ok(OverOpaque::new(frame, over_opaque::of(values), inner))
+        let inner = AdaptiveAt { columns: Columns::of(values, frame), nodes: room(values) };
+        Ok(OverOpaque::new(values, frame, over_opaque::of(values), inner))
     }
 
     fn promises(values: &Values) -> Promises {
@@ -62,7 +59,6 @@ impl Blueprint for Adaptive {
 pub struct AdaptiveAt<const N: usize> {
     columns: Columns<N>,
     nodes: usize,
-    bits: u32,
 }
 
 /// A pixel.
@@ -75,12 +71,19 @@ pub struct AdaptivePixel {
 }
 
 impl<const N: usize> AdaptiveAt<N> {
-    /// The sum of the pixel's columns.
-    const COLOUR_BITS: u32 = 3 * 32;
+    /// What a node holds. Its transmittance stands beside no colour, and is of single
+    /// precision whatever colours are.
+    fn node(&self) -> [(u32, &'static str); 3] {
+        [(DEPTH_BITS, "depth"), (self.columns.mask_bits(), "coverage"), (32, "transmittance")]
+    }
+
+    fn node_bits(&self) -> u32 {
+        self.node().iter().map(|(bits, _)| bits).sum()
+    }
 
     /// Removes the node whose removal changes the area least. Areas are compared as
     /// integers.
-    fn remove_least(&self, nodes: &mut Vec<Layer>) {
+    fn remove_least<P: Probe>(&self, nodes: &mut Vec<Layer>, probe: &mut P) {
         // All but the first and the last; of two nodes, the second.
         let end = (nodes.len() - 1).max(2);
         let mut passes = [1.0_f32; N];
@@ -92,6 +95,8 @@ impl<const N: usize> AdaptiveAt<N> {
         };
         let mut before = visibility(&nodes[0]);
         let mut least = (u128::MAX, 1);
+        // The least of the areas of all nodes from the second to before the end.
+        probe.compared(end as u32 - 2);
         for i in 1..end {
             let after = visibility(&nodes[i]);
             let step = u128::from(before.saturating_sub(after));
@@ -113,9 +118,10 @@ impl<const N: usize> Transparent<N> for AdaptiveAt<N> {
         2
     }
 
-    fn state_bits(&self) -> StateBits {
-        let extra = self.nodes as u32 * self.bits + Self::COLOUR_BITS;
-        StateBits { samples: 0, extra, unbounded: false }
+    fn layout(&self) -> Layout {
+        // The sum of the pixel's columns.
+        let sum = [(self.columns.store.colour_bits(), "colour")];
+        Layout::of(self.nodes as u32, &self.node()).and(1, &sum)
     }
 
     fn clear(&self, _site: Site) -> AdaptivePixel {
@@ -130,25 +136,33 @@ impl<const N: usize> Transparent<N> for AdaptiveAt<N> {
         fragment: &Fragment,
         probe: &mut P,
     ) {
-        let layer = self.columns.layer(fragment);
+        let (coverage, alpha) = self.columns.place(fragment);
         probe.written(fragment.coverage);
         if pass == 0 {
-            let node = Layer { colour: [0.0; 3], ..layer };
-            insert(&mut pixel.nodes, self.nodes + 1, node, self.bits, probe);
+            let node = Layer {
+                depth: fragment.depth.z,
+                coverage,
+                colour: [0.0; 3],
+                transmittance: 1.0 - alpha,
+            };
+            insert(&mut pixel.nodes, self.nodes + 1, node, self.node_bits(), probe);
             if pixel.nodes.len() > self.nodes {
-                self.remove_least(&mut pixel.nodes);
+                self.remove_least(&mut pixel.nodes, probe);
                 // All are read; those from the removed one on move back.
-                let bits = self.bits * self.nodes as u32;
+                let bits = self.node_bits() * self.nodes as u32;
                 probe.state(bits, bits);
             }
             return;
         }
-        let nearer = &pixel.nodes[..nearer(&pixel.nodes, layer.depth)];
-        let visible: f64 = layer.coverage.iter().map(|s| composite(nearer, s).1).sum();
-        for (sum, c) in pixel.colour.iter_mut().zip(layer.colour) {
-            *sum += c * visible as f32;
+        let nearer = &pixel.nodes[..nearer(&pixel.nodes, fragment.depth.z, probe)];
+        let visible: f64 = coverage.iter().map(|s| composite(nearer, s).1).sum();
+        let store = self.columns.store;
+        for (sum, c) in pixel.colour.iter_mut().zip(fragment.colour) {
+            *sum = store.channel(*sum + c * alpha * visible as f32);
         }
-        probe.state(self.bits * pixel.nodes.len() as u32 + Self::COLOUR_BITS, Self::COLOUR_BITS);
+        let unread = self.node_bits() - DEPTH_BITS;
+        let read = unread * pixel.nodes.len() as u32 + store.colour_bits();
+        probe.state(read, store.colour_bits());
     }
 
     fn resolve(&self, _site: Site, pixel: &AdaptivePixel, behind: &[[f32; 3]; N]) -> [f64; 3] {
@@ -170,12 +184,13 @@ impl<const N: usize> Transparent<N> for AdaptiveAt<N> {
 mod tests {
     use super::*;
     use crate::design::configure;
+    use crate::rop::NoProbe;
     use crate::trace::{SampleMask, Unorm32};
 
     #[test]
     fn the_least_area_goes_and_the_node_before_takes_its_step() {
         let design = configure("adaptive", &[]).unwrap();
-        let design = AdaptiveAt::<1> { columns: Columns::of(design.values()), nodes: 3, bits: 65 };
+        let design = AdaptiveAt::<1> { columns: Columns::of(design.values(), &frame), nodes: 3 };
         let node = |depth, transmittance| Layer {
             depth: Unorm32(depth),
             coverage: SampleMask(1),
@@ -184,14 +199,14 @@ mod tests {
         };
         // Steps from visibility 0.5 on: 0.25 over 100, 0.125 over 100; the last stays.
         let mut nodes = vec![node(0, 0.5), node(100, 0.5), node(200, 0.5), node(201, 0.9)];
-        design.remove_least(&mut nodes);
+        design.remove_least(&mut nodes, &mut NoProbe);
         assert_eq!(nodes, [node(0, 0.5), node(100, 0.25), node(201, 0.9)]);
         // 0.25 over 10 is less than 0.125 over 90.
         let mut nodes = vec![node(0, 0.5), node(10, 0.5), node(100, 0.5), node(201, 0.9)];
-        design.remove_least(&mut nodes);
+        design.remove_least(&mut nodes, &mut NoProbe);
         assert_eq!(nodes, [node(0, 0.25), node(100, 0.5), node(201, 0.9)]);
         let mut nodes = vec![node(0, 0.5), node(10, 0.5)];
-        design.remove_least(&mut nodes);
+        design.remove_least(&mut nodes, &mut NoProbe);
         assert_eq!(nodes, [node(0, 0.25)]);
     }
 }

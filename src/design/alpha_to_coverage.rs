@@ -7,7 +7,7 @@ use crate::param::Values;
 use crate::rop::stochastic::{self, Round, Sampler, Stochastic};
 use crate::rop::{
     Blueprint, Family, Frame, Info, OpaquePromise, OrderPromise, Probe, Promises, Site, Threshold,
-    depth_bits,
+    colour, depth_bits,
 };
 use crate::trace::{Fragment, SampleMask, Unorm32};
 
@@ -20,7 +20,7 @@ impl Blueprint for AlphaToCoverage {
         family: Family::Stochastic,
         summary: "the same samples for the same alpha: layers hide each other (the known wrong answer)",
         citation: "OpenGL 4.6 specification, section 17.3.1 (GL_SAMPLE_ALPHA_TO_COVERAGE)",
-        params: &[depth_bits::PARAM],
+        params: &[depth_bits::PARAM, colour::PARAM],
         combinations: &[],
     };
 

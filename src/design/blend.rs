@@ -5,8 +5,8 @@ use crate::error::Result;
 use crate::param::Values;
 use crate::rop::over_opaque;
 use crate::rop::{
-    BlendBuffer, Blueprint, Contents, Family, Frame, Info, Opaque, OpaquePromise, OrderPromise,
-    OverOpaque, Probe, Promises, Site, StateBits, Transparent,
+    BlendBuffer, Blueprint, ColourStore, Contents, Family, Frame, Info, Layout, Opaque,
+    OpaquePromise, OrderPromise, OverOpaque, Probe, Promises, Site, Transparent, colour,
 };
 use crate::trace::Fragment;
 
@@ -19,15 +19,20 @@ impl Blueprint for Blend {
         family: Family::Blended,
         summary: "alpha blending in API order, sample by sample: the baseline of cost",
         citation: "Porter, Duff: Compositing Digital Images, SIGGRAPH 1984, operator over",
-        params: &[over_opaque::PARAM],
+        params: &[over_opaque::PARAM, colour::PARAM],
         combinations: &[],
     };
 
     type At<const N: usize> = OverOpaque<BlendAt<N>, N>;
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
-        let opaque = over_opaque::of(values);
-        Ok(OverOpaque::new(frame, opaque, BlendAt { opaque, colour_bits: frame.colour_bits }))
+        let opaque = over_opaque::on(values, frame);
+        Ok(OverOpaque::new(
+            values,
+            frame,
+            opaque,
+            BlendAt { opaque, store: ColourStore::of(values, frame) },
+        ))
     }
 
     fn promises(values: &Values) -> Promises {
@@ -44,18 +49,22 @@ impl Blueprint for Blend {
 #[derive(Clone, Debug)]
 pub struct BlendAt<const N: usize> {
     opaque: Opaque,
-    colour_bits: u32,
+    store: ColourStore,
 }
 
 impl<const N: usize> Transparent<N> for BlendAt<N> {
     type Pixel = BlendBuffer<N>;
 
-    fn state_bits(&self) -> StateBits {
-        BlendBuffer::<N>::state_bits(self.opaque, self.colour_bits)
+    fn layout(&self) -> Layout {
+        BlendBuffer::<N>::layout(self.opaque, self.store)
     }
 
     fn clear(&self, _site: Site) -> BlendBuffer<N> {
         BlendBuffer::default()
+    }
+
+    fn over(&self, buffer: &mut BlendBuffer<N>, behind: &[[f32; 3]; N]) {
+        buffer.colour = *behind;
     }
 
     fn draw<P: Probe>(
@@ -66,12 +75,12 @@ impl<const N: usize> Transparent<N> for BlendAt<N> {
         fragment: &Fragment,
         probe: &mut P,
     ) {
-        buffer.blend(fragment.coverage, fragment.colour, fragment.alpha);
-        BlendBuffer::<N>::tell(fragment.coverage, probe);
+        buffer.blend(fragment.coverage, fragment.colour, fragment.alpha, self.store);
+        BlendBuffer::<N>::tell(fragment.coverage, self.store, probe);
     }
 
-    fn resolve(&self, _site: Site, buffer: &BlendBuffer<N>, behind: &[[f32; 3]; N]) -> [f64; 3] {
-        buffer.over(behind)
+    fn resolve(&self, _site: Site, buffer: &BlendBuffer<N>, _: &[[f32; 3]; N]) -> [f64; 3] {
+        buffer.resolve()
     }
 
     fn contents(&self, buffer: &BlendBuffer<N>) -> Contents {

@@ -11,8 +11,8 @@ use crate::error::Result;
 use crate::param::{Param, Values};
 use crate::rop::layers::{LAYERS, room};
 use crate::rop::{
-    Blueprint, Contents, Family, Frame, Info, OpaquePromise, OrderPromise, OverOpaque, Probe,
-    Promises, Site, StateBits, Transparent, over_opaque,
+    Blueprint, ColourStore, Contents, Family, Frame, Info, Layout, OpaquePromise, OrderPromise,
+    OverOpaque, Probe, Promises, Site, Transparent, colour, over_opaque,
 };
 use crate::trace::{Fragment, SampleMask, Unorm32};
 
@@ -37,6 +37,7 @@ impl Blueprint for DepthPeeling {
             over_opaque::PARAM,
             LAYERS,
             Param::choice::<Ties>("ties", "lost", "what becomes of fragments at equal depths"),
+            colour::PARAM,
         ],
         combinations: &[],
     };
@@ -46,10 +47,11 @@ impl Blueprint for DepthPeeling {
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
         let inner = DepthPeelingAt {
             frame: frame.clone(),
+            store: ColourStore::of(values, frame),
             layers: room(values) as u32,
             ties: values.choice("ties"),
         };
-        Ok(OverOpaque::new(frame, over_opaque::of(values), inner))
+        Ok(OverOpaque::new(values, frame, over_opaque::of(values), inner))
     }
 
     fn promises(_: &Values) -> Promises {
@@ -67,6 +69,7 @@ impl Blueprint for DepthPeeling {
 #[derive(Clone, Debug)]
 pub struct DepthPeelingAt<const N: usize> {
     frame: Frame,
+    store: ColourStore,
     layers: u32,
     ties: Ties,
 }
@@ -114,11 +117,6 @@ impl<const N: usize> DepthPeelingAt<N> {
         };
         u64::from(z.0) << 32 | u64::from(number)
     }
-
-    /// Colour and alpha.
-    fn shade_bits(&self) -> u32 {
-        self.frame.colour_bits + 32
-    }
 }
 
 impl<const N: usize> Transparent<N> for DepthPeelingAt<N> {
@@ -128,11 +126,16 @@ impl<const N: usize> Transparent<N> for DepthPeelingAt<N> {
         self.layers
     }
 
-    fn state_bits(&self) -> StateBits {
-        // Two depths and two colours with alpha for each sample.
-        let counter = self.key_bits() - 32;
-        let extra = N as u32 * 2 * (self.key_bits() + self.shade_bits()) + counter;
-        StateBits { samples: 0, extra, unbounded: false }
+    fn layout(&self) -> Layout {
+        // What is peeled already, and the nearest behind it.
+        let number = self.key_bits() - 32;
+        let buffer = [
+            (32, "depth"),
+            (number, "number"),
+            (self.store.colour_bits(), "colour"),
+            (self.store.channel_bits(), "alpha"),
+        ];
+        Layout::of(2 * N as u32, &buffer).and(1, &[(number, "counter")])
     }
 
     fn clear(&self, _site: Site) -> Peeled<N> {
@@ -157,30 +160,33 @@ impl<const N: usize> Transparent<N> for DepthPeelingAt<N> {
             let key = self.key(z[s], number);
             let behind_last = Some(key) > sample.last;
             if behind_last && sample.candidate.is_none_or(|c| key <= c.key) {
-                let Fragment { colour, alpha, .. } = *fragment;
+                let colour = self.store.colour(fragment.colour);
+                let alpha = self.store.channel(fragment.alpha);
                 sample.candidate = Some(Candidate { key, colour, alpha });
                 written.insert(s);
             }
         }
+        // Both tests, whatever the first finds.
+        probe.compared(2 * fragment.coverage.count());
         probe.written(written);
         let counter = self.key_bits() - 32;
         probe.state(
             counter + 2 * self.key_bits() * fragment.coverage.count(),
-            counter + (self.key_bits() + self.shade_bits()) * written.count(),
+            counter + (self.key_bits() + self.store.texel_bits()) * written.count(),
         );
     }
 
     /// Blends what the pass has found behind what is peeled already.
-    fn end_pass(&self, _pass: u32, _site: Site, pixel: &mut Peeled<N>) {
+    fn end_pass<P: Probe>(&self, _pass: u32, _site: Site, pixel: &mut Peeled<N>, _probe: &mut P) {
         pixel.seen = 0;
         for sample in &mut pixel.samples {
             let Some(Candidate { key, colour, alpha }) = sample.candidate.take() else {
                 continue;
             };
             for (sum, c) in sample.colour.iter_mut().zip(colour) {
-                *sum += sample.transmittance * alpha * c;
+                *sum = self.store.channel(*sum + sample.transmittance * alpha * c);
             }
-            sample.transmittance *= 1.0 - alpha;
+            sample.transmittance = self.store.channel(sample.transmittance * (1.0 - alpha));
             sample.last = Some(key);
         }
     }

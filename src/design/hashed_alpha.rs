@@ -13,7 +13,7 @@ use crate::random::hash;
 use crate::rop::stochastic::{self, Round, Sampler, Stochastic};
 use crate::rop::{
     Blueprint, Family, Frame, Info, OpaquePromise, OrderPromise, Probe, Promises, Site, Threshold,
-    depth_bits,
+    colour, depth_bits,
 };
 use crate::trace::{Fragment, SampleMask, Unorm32};
 
@@ -38,6 +38,7 @@ impl Blueprint for HashedAlpha {
             Param::choice::<Each>("threshold", "sample", "for what a threshold is computed"),
             Param::real("scale", "1", (0.1, 16.0), "cells of the hash, in pixels"),
             depth_bits::PARAM,
+            colour::PARAM,
         ],
         combinations: &[],
     };

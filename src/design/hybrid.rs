@@ -6,8 +6,8 @@ use crate::error::Result;
 use crate::param::Values;
 use crate::rop::layers::{COVERAGE, LAYERS, Layer, Layering, composite, contents};
 use crate::rop::{
-    Blueprint, Contents, Family, Frame, Info, OpaquePromise, OrderPromise, OverOpaque, Probe,
-    Promises, Site, StateBits, Transparent, over_opaque,
+    Blueprint, ColourStore, Contents, Family, Frame, Info, Layout, OpaquePromise, OrderPromise,
+    OverOpaque, Probe, Promises, Site, Transparent, colour, over_opaque,
 };
 use crate::trace::Fragment;
 
@@ -20,7 +20,7 @@ impl Blueprint for Hybrid {
         family: Family::Layered,
         summary: "the nearest layers, sorted, before the weighted average of all others",
         citation: "Maule, Comba, Torchelsen, Bastos: Hybrid Transparency, I3D 2013",
-        params: &[over_opaque::PARAM, LAYERS, COVERAGE],
+        params: &[over_opaque::PARAM, LAYERS, COVERAGE, colour::PARAM],
         combinations: &[],
     };
 
@@ -28,7 +28,7 @@ impl Blueprint for Hybrid {
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
         let inner = HybridAt(Layering::of(values, frame));
-        Ok(OverOpaque::new(frame, over_opaque::of(values), inner))
+        Ok(OverOpaque::new(values, frame, over_opaque::of(values), inner))
     }
 
     fn promises(values: &Values) -> Promises {
@@ -67,16 +67,23 @@ struct Tail {
 }
 
 impl Tail {
-    /// Three sums of colour, one of alpha, a count.
-    const BITS: u32 = 5 * 32;
+    /// Three sums of colour, one of alpha, a count: all of them channels.
+    fn fields(store: ColourStore) -> [(u32, &'static str); 3] {
+        let channel = store.channel_bits();
+        [(store.colour_bits(), "tail colour"), (channel, "alpha"), (channel, "count")]
+    }
 
-    fn add(&mut self, layer: &Layer, columns: usize) {
+    fn bits(store: ColourStore) -> u32 {
+        Self::fields(store).iter().map(|(bits, _)| bits).sum()
+    }
+
+    fn add(&mut self, store: ColourStore, layer: &Layer, columns: usize) {
         let share = layer.coverage.count() as f32 / columns as f32;
         for (sum, c) in self.colour.iter_mut().zip(layer.colour) {
-            *sum += share * c;
+            *sum = store.channel(*sum + share * c);
         }
-        self.alpha += share * (1.0 - layer.transmittance);
-        self.count += share;
+        self.alpha = store.channel(self.alpha + share * (1.0 - layer.transmittance));
+        self.count = store.channel(self.count + share);
     }
 
     /// As `count` layers of the mean colour and the mean alpha: `c (1 − T)` and
@@ -94,8 +101,8 @@ impl Tail {
 impl<const N: usize> Transparent<N> for HybridAt<N> {
     type Pixel = HybridPixel;
 
-    fn state_bits(&self) -> StateBits {
-        self.0.state_bits(Tail::BITS)
+    fn layout(&self) -> Layout {
+        self.0.layout().and(1, &Tail::fields(self.0.columns.store))
     }
 
     fn clear(&self, _site: Site) -> HybridPixel {
@@ -112,8 +119,9 @@ impl<const N: usize> Transparent<N> for HybridAt<N> {
     ) {
         let layer = self.0.columns.layer(fragment);
         if let Some(furthest) = self.0.insert(&mut pixel.core, layer, probe) {
-            pixel.tail.add(&furthest, self.0.columns.count());
-            probe.state(Tail::BITS, Tail::BITS);
+            let store = self.0.columns.store;
+            pixel.tail.add(store, &furthest, self.0.columns.count());
+            probe.state(Tail::bits(store), Tail::bits(store));
         }
         probe.written(fragment.coverage);
     }
@@ -153,11 +161,11 @@ mod tests {
         assert_eq!(tail.over(), ([0.0; 3], 1.0));
         // The mean colour is (0.25·1 + 0.75·0) / 1 = 0.25, the mean alpha 0.5, and two
         // such layers let a quarter pass.
-        tail.add(&layer(0b11, 1.0, 0.25), 2);
-        tail.add(&layer(0b11, 0.0, 0.75), 2);
+        tail.add(ColourStore::single(), &layer(0b11, 1.0, 0.25), 2);
+        tail.add(ColourStore::single(), &layer(0b11, 0.0, 0.75), 2);
         assert_eq!(tail.over(), ([0.25 * 0.75; 3], 0.25));
         // One column of two: half a layer more.
-        tail.add(&layer(0b10, 1.0, 0.5), 2);
+        tail.add(ColourStore::single(), &layer(0b10, 1.0, 0.5), 2);
         assert_eq!((tail.alpha, tail.count), (1.25, 2.5));
         let (colour, transmittance) = tail.over();
         assert!((transmittance - 0.5_f64.powf(2.5)).abs() < 1e-12);

@@ -5,8 +5,9 @@ use crate::error::Result;
 use crate::param::Values;
 use crate::rop::layers::{COVERAGE, LAYERS, Layer, Layering, contents};
 use crate::rop::{
-    Blueprint, Contents, Declaration, Family, Frame, Info, OnDevice, OpaquePromise, OrderPromise,
-    OverOpaque, PixelWords, Port, Probe, Promises, Site, StateBits, Transparent, over_opaque,
+    Blueprint, Contents, Declaration, Family, Frame, Info, Layout, OnDevice, OpaquePromise,
+    OrderPromise, OverOpaque, PixelWords, Port, Probe, Promises, Site, Transparent, colour,
+    over_opaque,
 };
 use crate::trace::Fragment;
 
@@ -19,7 +20,7 @@ impl Blueprint for KBuffer {
         family: Family::Layered,
         summary: "the nearest layers, sorted; what lies behind them is dropped",
         citation: "Bavoil, Callahan, Lefohn, Comba, Silva: Multi-Fragment Effects on the GPU using the k-Buffer, I3D 2007",
-        params: &[over_opaque::PARAM, LAYERS, COVERAGE],
+        params: &[over_opaque::PARAM, LAYERS, COVERAGE, colour::PARAM],
         combinations: &[],
     };
 
@@ -27,7 +28,7 @@ impl Blueprint for KBuffer {
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
         let inner = KBufferAt(Layering::of(values, frame));
-        Ok(OverOpaque::new(frame, over_opaque::of(values), inner))
+        Ok(OverOpaque::new(values, frame, over_opaque::of(values), inner))
     }
 
     const PORTED: bool = true;
@@ -57,8 +58,8 @@ impl<const N: usize> Transparent<N> for KBufferAt<N> {
     /// The layers from near to far.
     type Pixel = Vec<Layer>;
 
-    fn state_bits(&self) -> StateBits {
-        self.0.state_bits(0)
+    fn layout(&self) -> Layout {
+        self.0.layout()
     }
 
     fn clear(&self, _site: Site) -> Vec<Layer> {

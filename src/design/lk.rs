@@ -17,7 +17,7 @@ use crate::rop::tracked::{
 };
 use crate::rop::{
     Blueprint, Engine, Family, Frame, Info, OpaquePromise, OrderPromise, Port, Promise, Promises,
-    Reference, Stochastic, depth_bits,
+    Reference, Stochastic, colour, depth_bits,
 };
 
 /// The design's entry in the registry.
@@ -42,6 +42,7 @@ impl Blueprint for LaineKarras {
             STRATA,
             OPAQUE,
             depth_bits::PARAM,
+            colour::PARAM,
         ],
         combinations: &COMBINATIONS,
     };
@@ -62,6 +63,9 @@ impl Blueprint for LaineKarras {
         Count<N>: Width,
     {
         let plain = Self::at::<N>(values, frame)?;
+        if !plain.keeps_colours() {
+            return Ok(None);
+        }
         if is_published(values) {
             let sampler = FastTracked::<_, _, N>::new(values, Published, PublishedHash);
             return Ok(Some(Box::new(FastEngine::new(plain, sampler, level))));
@@ -157,6 +161,7 @@ mod tests {
             background: [0.5; 3],
             seed: 3,
             colour_bits: 96,
+            opaque: true,
             primitive_depths: None,
         };
         let design = configure("lk", &[]).unwrap();

@@ -6,9 +6,9 @@
 use crate::error::Result;
 use crate::param::{Param, Values};
 use crate::rop::{
-    Accumulators, Blueprint, Contents, Coverage, Family, Frame, Info, MomentCount, Moments,
-    OpaquePromise, OrderPromise, OverOpaque, Probe, Promises, Site, StateBits, Transparent,
-    ViewDepth, accumulators, over_opaque, view_depth,
+    Accumulators, Blueprint, ColourStore, Contents, Coverage, Family, Frame, Info, Layout,
+    MomentCount, Moments, OpaquePromise, OrderPromise, OverOpaque, Probe, Promises, Site,
+    Transparent, ViewDepth, accumulators, colour, over_opaque, view_depth,
 };
 use crate::trace::Fragment;
 
@@ -41,6 +41,7 @@ impl Blueprint for MomentBased {
             view_depth::LENS,
             accumulators::PARAM,
             over_opaque::PARAM,
+            colour::PARAM,
         ],
         combinations: &["moments=8,coverage=share", "moments=8,bias=0.1"],
     };
@@ -54,8 +55,9 @@ impl Blueprint for MomentBased {
             overestimation: values.real("overestimation"),
             depth: ViewDepth::of(values),
             coverage: accumulators::of(values),
+            store: ColourStore::of(values, frame),
         };
-        Ok(OverOpaque::new(frame, over_opaque::of(values), inner))
+        Ok(OverOpaque::new(values, frame, over_opaque::of(values), inner))
     }
 
     fn promises(values: &Values) -> Promises {
@@ -78,6 +80,7 @@ pub struct MomentBasedAt<const N: usize> {
     overestimation: f64,
     depth: ViewDepth,
     coverage: Coverage,
+    store: ColourStore,
 }
 
 /// What is kept of all fragments together.
@@ -90,9 +93,6 @@ pub struct Sums {
     /// Σ α T.
     weight: f32,
 }
-
-/// Bits of the second pass's sums.
-const COLOUR_BITS: u32 = 4 * 32;
 
 /// The least 1 − α: an opaque fragment's absorbance has no bound. It is the least
 /// that another alpha in single precision has.
@@ -127,9 +127,14 @@ impl<const N: usize> Transparent<N> for MomentBasedAt<N> {
         2
     }
 
-    fn state_bits(&self) -> StateBits {
-        let extra = (self.moment_bits() + COLOUR_BITS) * self.coverage.sums(N) as u32;
-        StateBits { samples: 0, extra, unbounded: false }
+    fn layout(&self) -> Layout {
+        // Moments are of single precision whatever colours are: their matrix asks for it.
+        let sums = [
+            (self.moment_bits(), "moments"),
+            (self.store.colour_bits(), "colour"),
+            (self.store.channel_bits(), "weight"),
+        ];
+        Layout::of(self.coverage.sums(N) as u32, &sums)
     }
 
     fn clear(&self, _site: Site) -> Self::Pixel {
@@ -171,11 +176,12 @@ impl<const N: usize> Transparent<N> for MomentBasedAt<N> {
             };
             last = Some((sums.moments, weight));
             for (sum, c) in sums.colour.iter_mut().zip(fragment.colour) {
-                *sum += weight * c;
+                *sum = self.store.channel(*sum + weight * c);
             }
-            sums.weight += weight;
+            sums.weight = self.store.channel(sums.weight + weight);
         }
-        probe.state((self.moment_bits() + COLOUR_BITS) * count, COLOUR_BITS * count);
+        let texel = self.store.texel_bits();
+        probe.state((self.moment_bits() + texel) * count, texel * count);
     }
 
     fn resolve(&self, _site: Site, pixel: &Self::Pixel, behind: &[[f32; 3]; N]) -> [f64; 3] {

@@ -5,8 +5,9 @@ use crate::error::Result;
 use crate::param::Values;
 use crate::rop::layers::{COVERAGE, LAYERS, Layer, Layering, contents};
 use crate::rop::{
-    Blueprint, Contents, Declaration, Family, Frame, Info, OnDevice, OpaquePromise, OrderPromise,
-    OverOpaque, PixelWords, Port, Probe, Promises, Site, StateBits, Transparent, over_opaque,
+    Blueprint, Contents, Declaration, Family, Frame, Info, Layout, OnDevice, OpaquePromise,
+    OrderPromise, OverOpaque, PixelWords, Port, Probe, Promises, Site, Transparent, colour,
+    over_opaque,
 };
 use crate::trace::Fragment;
 
@@ -19,7 +20,7 @@ impl Blueprint for Mlab {
         family: Family::Layered,
         summary: "layers sorted as they come; of one too many the last two are merged",
         citation: "Salvi, Vaidyanathan: Multi-Layer Alpha Blending, I3D 2014",
-        params: &[over_opaque::PARAM, LAYERS, COVERAGE],
+        params: &[over_opaque::PARAM, LAYERS, COVERAGE, colour::PARAM],
         combinations: &[],
     };
 
@@ -27,7 +28,7 @@ impl Blueprint for Mlab {
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
         let inner = MlabAt(Layering::of(values, frame));
-        Ok(OverOpaque::new(frame, over_opaque::of(values), inner))
+        Ok(OverOpaque::new(values, frame, over_opaque::of(values), inner))
     }
 
     const PORTED: bool = true;
@@ -56,8 +57,8 @@ impl<const N: usize> Transparent<N> for MlabAt<N> {
     /// The layers from near to far.
     type Pixel = Vec<Layer>;
 
-    fn state_bits(&self) -> StateBits {
-        self.0.state_bits(0)
+    fn layout(&self) -> Layout {
+        self.0.layout()
     }
 
     fn clear(&self, _site: Site) -> Vec<Layer> {
@@ -76,7 +77,7 @@ impl<const N: usize> Transparent<N> for MlabAt<N> {
         if let Some(furthest) = self.0.insert(layers, layer, probe)
             && let Some(last) = layers.last_mut()
         {
-            *last = last.merged(&furthest);
+            *last = self.0.columns.stored(last.merged(&furthest));
             // Where all moved, the last was read and is written anyway.
             if furthest == layer {
                 probe.state(self.0.bits - 32, self.0.bits);
@@ -120,6 +121,7 @@ mod tests {
             background: [1.0; 3],
             seed: 0,
             colour_bits: 48,
+            opaque: true,
             primitive_depths: None,
         };
         let fragment = |z: u32, colour: f32, alpha: f32| Fragment {

@@ -43,9 +43,10 @@ use crate::error::{Error, Result};
 use crate::gpu::{Gpu, GpuOptions, GpuRun, GpuSeconds};
 use crate::param::{Values, parse_spec};
 use crate::rop::fast::{Count, Width};
+use crate::rop::stochastic::draws_opaque_first;
 use crate::rop::{
-    Blueprint, Engine, Explanation, Frame, Info, Port, PrimitiveDepths, Promises, ReplayOptions,
-    Replayed, Site, StateBits, Which, explain, replay,
+    Blueprint, Engine, Explanation, Frame, Info, Layout, Port, PrimitiveDepths, Promises,
+    ReplayOptions, Replayed, Site, StateBits, Which, explain, replay,
 };
 use crate::trace::Trace;
 
@@ -259,6 +260,7 @@ impl Configured {
             picture,
             events: None,
             state_bits: port.plain.state_bits(),
+            layout: port.plain.layout(),
             passes: port.plain.passes(),
             touched_tiles: run.touched_tiles(),
         };
@@ -288,6 +290,14 @@ impl Configured {
         explain(&*self.build(&frame, Which::Reference)?, &frame, trace, site, progress)
     }
 
+    /// What a pixel holds, at the sample count of `frame`.
+    ///
+    /// # Errors
+    /// As [`Blueprint::at`].
+    pub fn layout(&self, frame: &Frame) -> Result<Layout> {
+        Ok(self.build(frame, Which::Reference)?.layout())
+    }
+
     /// State per pixel at the sample count of `frame`.
     ///
     /// # Errors
@@ -302,6 +312,9 @@ impl Configured {
     /// As [`Frame::of`] and [`Trace::batch`].
     pub fn frame(&self, trace: &Trace, samples: u32, seed: u32) -> Result<Frame> {
         let mut frame = Frame::of(trace, samples, seed)?;
+        if draws_opaque_first(&self.values) {
+            frame.opaque = trace.has_opaque()?;
+        }
         if self.entry.primitive_depths {
             frame.primitive_depths = Some(Arc::new(PrimitiveDepths::of(trace)?));
         }

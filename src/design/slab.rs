@@ -37,13 +37,14 @@ use crate::error::Result;
 use crate::param::{Param, Values};
 use crate::random::hash;
 use crate::rop::layers::{
-    self, COVERAGE, Columns, Coverage, Deep, LAYERS, Layer, composite, contents, insert, nearer,
-    room,
+    self, COVERAGE, Columns, Coverage, DEPTH_BITS, Deep, LAYERS, Layer, composite, contents,
+    nearer, room,
 };
 use crate::rop::{
-    Blueprint, Contents, Declaration, Family, Frame, Info, Normalise, OnDevice, OpaquePromise,
-    OrderPromise, OverOpaque, PixelWords, Port, Probe, Promises, Site, StateBits, Sums, Threshold,
-    Transparent, over_opaque, random_subset, visible_independent, visible_stratified,
+    Blueprint, Contents, Declaration, Family, Frame, Info, Layout, Normalise, OnDevice,
+    OpaquePromise, OrderPromise, OverOpaque, PixelWords, Port, Probe, Promises, Site, Sums,
+    Threshold, Transparent, colour, over_opaque, random_subset, visible_independent,
+    visible_stratified,
 };
 use crate::trace::{Fragment, SampleMask, Unorm32};
 
@@ -94,6 +95,7 @@ impl Blueprint for Slab {
             Param::choice::<Hidden>("hidden", "kept", "what becomes of layers wholly hidden"),
             Param::flag("weigh", false, "divide alpha by the probability to enter (continuous)"),
             COVERAGE,
+            colour::PARAM,
         ],
         combinations: &[
             "opacity=discrete,normalise=none",
@@ -108,9 +110,8 @@ impl Blueprint for Slab {
     type At<const N: usize> = OverOpaque<SlabAt<N>, N>;
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
-        let (columns, bits) = (Columns::of(values), values.integer("bits") as u32);
+        let (columns, bits) = (Columns::of(values, frame), values.integer("bits") as u32);
         let opacity = if bits == 0 { Opacity::Continuous } else { values.choice("opacity") };
-        let opacity_bits = if opacity == Opacity::Discrete { bits } else { 32 };
         let inner = SlabAt {
             columns,
             seed: frame.seed,
@@ -121,9 +122,8 @@ impl Blueprint for Slab {
             normalise: values.choice("normalise"),
             hidden: values.choice("hidden"),
             weigh: values.flag("weigh"),
-            layer_bits: 32 + columns.mask_bits() + frame.colour_bits + opacity_bits,
         };
-        Ok(OverOpaque::new(frame, over_opaque::of(values), inner))
+        Ok(OverOpaque::new(values, frame, over_opaque::of(values), inner))
     }
 
     const PORTED: bool = true;
@@ -170,7 +170,6 @@ pub struct SlabAt<const N: usize> {
     normalise: Normalise,
     hidden: Hidden,
     weigh: bool,
-    layer_bits: u32,
 }
 
 /// A layer. With discrete opacity it is opaque where it has a bit.
@@ -195,6 +194,24 @@ pub struct SlabPixel {
 }
 
 impl<const N: usize> SlabAt<N> {
+    /// What a layer holds.
+    fn fields(&self) -> [(u32, &'static str); 4] {
+        let store = self.columns.store;
+        [
+            (DEPTH_BITS, "depth"),
+            (self.columns.mask_bits(), "coverage"),
+            (store.colour_bits(), "colour"),
+            match self.opacity {
+                Opacity::Continuous => (store.channel_bits(), "alpha"),
+                Opacity::Discrete => (self.bits, "opacity bits"),
+            },
+        ]
+    }
+
+    fn layer_bits(&self) -> u32 {
+        self.fields().iter().map(|(bits, _)| bits).sum()
+    }
+
     /// The bits that layers leave free in a column.
     fn free(&self, layers: &[SlabLayer], column: usize) -> SampleMask {
         let here = layers.iter().filter(|l| l.layer.coverage.contains(column));
@@ -281,7 +298,7 @@ impl<const N: usize> SlabAt<N> {
             let layer = Layer {
                 depth: fragment.depth.z,
                 coverage,
-                colour: fragment.colour,
+                colour: self.columns.store.colour(fragment.colour),
                 transmittance: 0.0,
             };
             let seen = coverage.iter().any(|s| !(self.free(before, s) & bits).is_empty());
@@ -302,11 +319,11 @@ impl<const N: usize> SlabAt<N> {
         }
         let alpha = (f64::from(alpha) / p) as f32;
         Some(SlabLayer {
-            layer: Layer {
+            layer: self.columns.stored(Layer {
                 colour: fragment.colour.map(|c| c * alpha),
                 transmittance: 1.0 - alpha,
                 ..whole.layer
-            },
+            }),
             ..whole
         })
     }
@@ -326,19 +343,26 @@ impl<const N: usize> SlabAt<N> {
 
     fn enter<P: Probe>(&self, site: Site, pixel: &mut SlabPixel, f: &Fragment, probe: &mut P) {
         let layers = &mut pixel.layers;
-        let place = nearer(layers, f.depth.z);
+        let place = nearer(layers, f.depth.z, probe);
         if place == self.room {
-            return probe.state(32 * place as u32, 0);
+            return;
         }
-        probe.state((self.layer_bits - 32) * place as u32, 0);
+        let unread = self.layer_bits() - DEPTH_BITS;
+        if self.bits != 0 {
+            // What lies before decides whether it enters.
+            probe.state(unread * place as u32, 0);
+        }
         let Some(layer) = self.layer(site, &layers[..place], f, probe) else {
             return;
         };
-        insert(layers, self.room + 1, layer, self.layer_bits, probe);
+        // What lies behind moves, if it stays.
+        probe.state(unread * (layers.len() - place) as u32, 0);
+        layers.insert(place, layer);
         if self.hidden == Hidden::Removed && self.opacity == Opacity::Discrete {
             self.remove_hidden(layers);
         }
         layers.truncate(self.room);
+        probe.state(0, self.layer_bits() * layers.len().saturating_sub(place) as u32);
         probe.written(f.coverage);
     }
 }
@@ -350,9 +374,9 @@ impl<const N: usize> Transparent<N> for SlabAt<N> {
         if self.normalise == Normalise::None { 1 } else { 2 }
     }
 
-    fn state_bits(&self) -> StateBits {
-        let sums = self.normalise.state_bits(self.columns.count());
-        StateBits { samples: 0, extra: self.room as u32 * self.layer_bits + sums, unbounded: false }
+    fn layout(&self) -> Layout {
+        let sums = self.normalise.layout(self.columns.count() as u32, self.columns.store);
+        Layout::of(self.room as u32, &self.fields()).joined(sums)
     }
 
     fn clear(&self, _site: Site) -> SlabPixel {
@@ -371,17 +395,19 @@ impl<const N: usize> Transparent<N> for SlabAt<N> {
             return self.enter(site, pixel, fragment, probe);
         }
         let (coverage, alpha) = self.columns.place(fragment);
-        let before = &pixel.layers[..nearer(&pixel.layers, fragment.depth.z)];
         let visible = if self.normalise.by_depth() {
-            probe.state(self.layer_bits * pixel.layers.len() as u32, 0);
-            coverage.iter().map(|s| self.through(before, s).1).sum()
+            let place = nearer(&pixel.layers, fragment.depth.z, probe);
+            probe.state((self.layer_bits() - DEPTH_BITS) * pixel.layers.len() as u32, 0);
+            coverage.iter().map(|s| self.through(&pixel.layers[..place], s).1).sum()
         } else {
             0.0
         };
         let columns = self.columns.count();
-        pixel.sums.add(self.normalise, columns, coverage, fragment.colour, alpha, visible);
+        let store = self.columns.store;
+        let colour = fragment.colour;
+        pixel.sums.add(self.normalise, store, columns, coverage, colour, alpha, visible);
         probe.written(fragment.coverage);
-        let bits = self.normalise.touched_bits(coverage.count());
+        let bits = self.normalise.layout(coverage.count(), store).bits().total();
         probe.state(bits, bits);
     }
 

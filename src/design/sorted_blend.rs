@@ -15,8 +15,8 @@ use crate::error::Result;
 use crate::param::Values;
 use crate::rop::over_opaque;
 use crate::rop::{
-    BlendBuffer, Blueprint, Contents, Family, Frame, Info, Opaque, OpaquePromise, OrderPromise,
-    OverOpaque, PrimitiveDepths, Probe, Promises, Site, StateBits, Transparent,
+    BlendBuffer, Blueprint, ColourStore, Contents, Family, Frame, Info, Layout, NoProbe, Opaque,
+    OpaquePromise, OrderPromise, OverOpaque, PrimitiveDepths, Probe, Promises, Site, Transparent,
 };
 use crate::trace::{Fragment, SampleMask};
 
@@ -38,10 +38,10 @@ impl Blueprint for SortedBlend {
     type At<const N: usize> = OverOpaque<SortedBlendAt<N>, N>;
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
-        let opaque = over_opaque::of(values);
+        let opaque = over_opaque::on(values, frame);
         let depths = frame.primitive_depths.clone().unwrap_or_default();
-        let inner = SortedBlendAt { opaque, colour_bits: frame.colour_bits, depths };
-        Ok(OverOpaque::new(frame, opaque, inner))
+        let inner = SortedBlendAt { opaque, store: ColourStore::of(values, frame), depths };
+        Ok(OverOpaque::new(values, frame, opaque, inner))
     }
 
     fn promises(values: &Values) -> Promises {
@@ -60,7 +60,7 @@ impl Blueprint for SortedBlend {
 #[derive(Clone, Debug)]
 pub struct SortedBlendAt<const N: usize> {
     opaque: Opaque,
-    colour_bits: u32,
+    store: ColourStore,
     depths: Arc<PrimitiveDepths>,
 }
 
@@ -74,11 +74,11 @@ pub struct Waiting {
 }
 
 impl<const N: usize> SortedBlendAt<N> {
-    /// The fragments blended as they stand.
-    fn blended(fragments: &[Waiting]) -> BlendBuffer<N> {
-        let mut buffer = BlendBuffer::default();
+    /// The fragments blended as they stand, over what lies behind them.
+    fn blended(&self, fragments: &[Waiting], behind: &[[f32; 3]; N]) -> BlendBuffer<N> {
+        let mut buffer = BlendBuffer { colour: *behind };
         for f in fragments {
-            buffer.blend(f.coverage, f.colour, f.alpha);
+            buffer.blend(f.coverage, f.colour, f.alpha, self.store);
         }
         buffer
     }
@@ -88,8 +88,8 @@ impl<const N: usize> Transparent<N> for SortedBlendAt<N> {
     /// In API order until the pass ends, then far to near.
     type Pixel = Vec<Waiting>;
 
-    fn state_bits(&self) -> StateBits {
-        BlendBuffer::<N>::state_bits(self.opaque, self.colour_bits)
+    fn layout(&self) -> Layout {
+        BlendBuffer::<N>::layout(self.opaque, self.store)
     }
 
     fn clear(&self, _site: Site) -> Vec<Waiting> {
@@ -106,22 +106,30 @@ impl<const N: usize> Transparent<N> for SortedBlendAt<N> {
     ) {
         let Fragment { coverage, colour, alpha, primitive, .. } = *fragment;
         waiting.push(Waiting { key: self.depths.mean(primitive), coverage, colour, alpha });
-        BlendBuffer::<N>::tell(coverage, probe);
+        BlendBuffer::<N>::tell(coverage, self.store, probe);
     }
 
     /// A stable sort: what is equally deep is drawn in API order.
-    fn end_pass(&self, _pass: u32, _site: Site, waiting: &mut Vec<Waiting>) {
+    fn end_pass<P: Probe>(
+        &self,
+        _pass: u32,
+        _site: Site,
+        waiting: &mut Vec<Waiting>,
+        _probe: &mut P,
+    ) {
+        // The application sorts, before anything reaches the hardware.
         waiting.sort_by_key(|f| Reverse(f.key));
     }
 
     fn resolve(&self, _site: Site, sorted: &Vec<Waiting>, behind: &[[f32; 3]; N]) -> [f64; 3] {
-        Self::blended(sorted).over(behind)
+        self.blended(sorted, behind).resolve()
     }
 
     fn contents(&self, waiting: &Vec<Waiting>) -> Contents {
         let mut so_far = waiting.clone();
-        self.end_pass(0, Site { x: 0, y: 0 }, &mut so_far);
-        Self::blended(&so_far).contents()
+        self.end_pass(0, Site { x: 0, y: 0 }, &mut so_far, &mut NoProbe);
+        // Over black: what lies behind is shown apart.
+        self.blended(&so_far, &[[0.0; 3]; N]).contents()
     }
 
     fn bytes_per_fragment(&self) -> Option<usize> {

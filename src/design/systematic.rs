@@ -22,7 +22,7 @@ use crate::rop::tracked::{
 use crate::rop::{
     Blueprint, Declaration, Dither, Engine, Family, Frame, Info, OnDevice, OpaquePromise,
     OrderPromise, PixelWords, Port, Probe, Promise, Promises, Reference, ReferenceKey, Round, Site,
-    Stochastic, depth_bits,
+    Stochastic, colour, depth_bits,
 };
 
 crate::options! {
@@ -61,6 +61,7 @@ impl Blueprint for Systematic {
             STRATA,
             OPAQUE,
             depth_bits::PARAM,
+            colour::PARAM,
         ],
         combinations: &COMBINATIONS,
     };
@@ -81,6 +82,9 @@ impl Blueprint for Systematic {
         Count<N>: Width,
     {
         let plain = Self::at::<N>(values, frame)?;
+        if !plain.keeps_colours() {
+            return Ok(None);
+        }
         let references = Evenly::of(values);
         let summed_along_the_curve = references.phase == Phase::Sum
             && references.dither == Dither::Sequence

@@ -5,9 +5,9 @@
 use crate::error::Result;
 use crate::param::{Param, Values};
 use crate::rop::{
-    Accumulators, Blueprint, Contents, Coverage, Declaration, Family, Frame, Info, OnDevice,
-    OpaquePromise, OrderPromise, OverOpaque, PixelWords, Port, Probe, Promises, Site, StateBits,
-    Transparent, ViewDepth, accumulators, over_opaque, view_depth,
+    Accumulators, Blueprint, ColourStore, Contents, Coverage, Declaration, Family, Frame, Info,
+    Layout, OnDevice, OpaquePromise, OrderPromise, OverOpaque, PixelWords, Port, Probe, Promises,
+    Site, Transparent, ViewDepth, accumulators, colour, over_opaque, view_depth,
 };
 use crate::trace::{Fragment, Unorm32};
 
@@ -58,6 +58,7 @@ impl Blueprint for WeightedBlended {
             view_depth::LENS,
             accumulators::PARAM,
             over_opaque::PARAM,
+            colour::PARAM,
         ],
         combinations: &["weight=one,coverage=share", "coverage=share,opaque=together"],
     };
@@ -69,8 +70,9 @@ impl Blueprint for WeightedBlended {
             weight: values.choice("weight"),
             depth: ViewDepth::of(values),
             coverage: accumulators::of(values),
+            store: ColourStore::of(values, frame),
         };
-        Ok(OverOpaque::new(frame, over_opaque::of(values), inner))
+        Ok(OverOpaque::new(values, frame, over_opaque::of(values), inner))
     }
 
     const PORTED: bool = true;
@@ -96,6 +98,7 @@ pub struct WeightedBlendedAt<const N: usize> {
     weight: Weight,
     depth: ViewDepth,
     coverage: Coverage,
+    store: ColourStore,
 }
 
 /// What is kept of all fragments together.
@@ -108,9 +111,6 @@ pub struct Sums {
     /// Π (1 − α).
     transmittance: f32,
 }
-
-/// Bits of these.
-const SUMS_BITS: u32 = 5 * 32;
 
 impl Default for Sums {
     fn default() -> Self {
@@ -130,9 +130,11 @@ impl Sums {
 impl<const N: usize> Transparent<N> for WeightedBlendedAt<N> {
     type Pixel = Accumulators<Sums>;
 
-    fn state_bits(&self) -> StateBits {
-        let extra = SUMS_BITS * self.coverage.sums(N) as u32;
-        StateBits { samples: 0, extra, unbounded: false }
+    fn layout(&self) -> Layout {
+        let channel = self.store.channel_bits();
+        let sums =
+            [(self.store.colour_bits(), "colour"), (channel, "weight"), (channel, "transmittance")];
+        Layout::of(self.coverage.sums(N) as u32, &sums)
     }
 
     fn clear(&self, _site: Site) -> Self::Pixel {
@@ -152,17 +154,19 @@ impl<const N: usize> Transparent<N> for WeightedBlendedAt<N> {
         let weight = self.weight.of(&self.depth, fragment.depth.z, alpha);
         let weighted = (weight * f64::from(alpha)) as f32;
         let touched = self.coverage.touched(fragment.coverage);
+        let store = self.store;
         let sums = pixel.touch(self.coverage.sums(N));
         for s in touched.iter() {
             let sums = &mut sums[s];
             for (sum, c) in sums.colour.iter_mut().zip(fragment.colour) {
-                *sum += weighted * c;
+                *sum = store.channel(*sum + weighted * c);
             }
-            sums.weight += weighted;
-            sums.transmittance *= 1.0 - alpha;
+            sums.weight = store.channel(sums.weight + weighted);
+            sums.transmittance = store.channel(sums.transmittance * (1.0 - alpha));
         }
         probe.written(fragment.coverage);
-        probe.state(SUMS_BITS * touched.count(), SUMS_BITS * touched.count());
+        let bits = 5 * store.channel_bits() * touched.count();
+        probe.state(bits, bits);
     }
 
     fn resolve(&self, _site: Site, pixel: &Self::Pixel, behind: &[[f32; 3]; N]) -> [f64; 3] {
@@ -235,6 +239,7 @@ mod tests {
             weight: Weight::One,
             depth: ViewDepth::new(1.0, 1.0, Lens::Parallel),
             coverage: Coverage::Sample,
+            store: ColourStore::single(),
         };
         let mut pixel = Accumulators::default();
         let site = Site { x: 0, y: 0 };

@@ -9,6 +9,7 @@ use crate::error::Result;
 use crate::param::{Param, Values};
 use crate::rop::event::Probe;
 use crate::rop::fast::{Count, Width};
+use crate::rop::layout::Layout;
 use crate::rop::over_opaque::{self, Opaque};
 use crate::rop::port::Port;
 use crate::rop::primitive_depths::PrimitiveDepths;
@@ -31,12 +32,16 @@ pub struct Frame {
     pub seed: u32,
     /// Bits that a stored colour takes.
     pub colour_bits: u32,
+    /// Whether opaque fragments (alpha 1) may come. Where none do, nothing is kept for them.
+    pub opaque: bool,
     /// The primitives' mean depths, for a design that asks for them.
     pub primitive_depths: Option<Arc<PrimitiveDepths>>,
 }
 
 impl Frame {
-    /// The frame of a replay of `trace` at `samples` samples.
+    /// The frame of a replay of `trace` at `samples` samples; that there are opaque
+    /// fragments is taken for granted, as is that nobody asks for the primitives' depths:
+    /// [`crate::design::Configured::frame`] finds out.
     ///
     /// # Errors
     /// As [`crate::trace::SamplePattern::prefix`].
@@ -51,6 +56,7 @@ impl Frame {
                 ColourFormat::F16 => 48,
                 ColourFormat::F32 => 96,
             },
+            opaque: true,
             primitive_depths: None,
         })
     }
@@ -101,8 +107,8 @@ pub trait Design: Send + Sync {
         1
     }
 
-    /// The bits of state that a pixel takes in hardware.
-    fn state_bits(&self) -> StateBits;
+    /// What a pixel holds in hardware, bit for bit.
+    fn layout(&self) -> Layout;
 
     /// A pixel's state before the first fragment.
     fn clear(&self, site: Site) -> Self::Pixel;
@@ -117,8 +123,17 @@ pub trait Design: Send + Sync {
         probe: &mut P,
     );
 
-    /// Is called when all fragments of a pass have been drawn.
-    fn end_pass(&self, _pass: u32, _site: Site, _pixel: &mut Self::Pixel) {}
+    /// Is called when all fragments of a pass have been drawn. `probe` is told what is
+    /// compared; state that is read and written once a pixel, here and to resolve it, is
+    /// not counted.
+    fn end_pass<P: Probe>(
+        &self,
+        _pass: u32,
+        _site: Site,
+        _pixel: &mut Self::Pixel,
+        _probe: &mut P,
+    ) {
+    }
 
     /// The pixel's linear colour over the background.
     fn resolve(&self, site: Site, pixel: &Self::Pixel) -> [f64; 3];

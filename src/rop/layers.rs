@@ -7,10 +7,15 @@
 //! sample, or a single one where coverage is but a share of alpha.
 
 use crate::param::{Param, Values};
-use crate::rop::design::{Contents, Frame, Site, StateBits};
+use crate::rop::colour::ColourStore;
+use crate::rop::design::{Contents, Frame, Site};
 use crate::rop::event::Probe;
+use crate::rop::layout::Layout;
 use crate::rop::port::{Declaration, OnDevice, PixelWords};
 use crate::trace::{Fragment, SampleMask, Unorm32};
+
+/// Bits of a layer's depth.
+pub const DEPTH_BITS: u32 = 32;
 
 /// How many layers a pixel keeps.
 pub const LAYERS: Param =
@@ -37,12 +42,15 @@ pub const COVERAGE: Param =
 #[derive(Clone, Copy, Debug)]
 pub struct Columns<const N: usize> {
     coverage: Coverage,
+    /// How layers store their colours, and one minus alpha beside them.
+    pub store: ColourStore,
 }
 
 impl<const N: usize> Columns<N> {
-    /// As the parameter [`COVERAGE`] says.
-    pub fn of(values: &Values) -> Self {
-        Columns { coverage: values.choice(COVERAGE.name) }
+    /// As the parameters [`COVERAGE`] and [`crate::rop::colour::PARAM`] say.
+    pub fn of(values: &Values, frame: &Frame) -> Self {
+        let store = ColourStore::of(values, frame);
+        Columns { coverage: values.choice(COVERAGE.name), store }
     }
 
     /// How many there are.
@@ -78,12 +86,32 @@ impl<const N: usize> Columns<N> {
     #[inline]
     pub fn layer(self, fragment: &Fragment) -> Layer {
         let (coverage, alpha) = self.place(fragment);
-        Layer {
+        self.stored(Layer {
             depth: fragment.depth.z,
             coverage,
             colour: fragment.colour.map(|c| c * alpha),
             transmittance: 1.0 - alpha,
+        })
+    }
+
+    /// A layer as it is stored.
+    #[inline]
+    pub fn stored(self, layer: Layer) -> Layer {
+        Layer {
+            colour: self.store.colour(layer.colour),
+            transmittance: self.store.channel(layer.transmittance),
+            ..layer
         }
+    }
+
+    /// What a whole layer holds.
+    fn fields(self) -> [(u32, &'static str); 4] {
+        [
+            (DEPTH_BITS, "depth"),
+            (self.mask_bits(), "coverage"),
+            (self.store.colour_bits(), "colour"),
+            (self.store.channel_bits(), "alpha"),
+        ]
     }
 
     /// The mean over the columns of what `column` gives: the colour that lies before
@@ -173,9 +201,13 @@ impl Layer {
     }
 }
 
-/// How many of a sorted list lie strictly before `depth`.
+/// How many of a sorted list lie strictly before `depth`, which is told to be compared
+/// with all of it: all depths are read.
 #[inline]
-pub fn nearer<T: Deep>(list: &[T], depth: Unorm32) -> usize {
+pub fn nearer<T: Deep, P: Probe>(list: &[T], depth: Unorm32, probe: &mut P) -> usize {
+    let held = list.len() as u32;
+    probe.compared(held);
+    probe.state(DEPTH_BITS * held, 0);
     // Lists are short, and most fragments are tested against all of one.
     list.iter().take_while(|l| l.depth() < depth).count()
 }
@@ -189,13 +221,12 @@ pub fn insert<T: Deep, P: Probe>(
     bits: u32,
     probe: &mut P,
 ) -> Option<T> {
-    let place = nearer(list, layer.depth());
+    let place = nearer(list, layer.depth(), probe);
     let held = list.len();
-    // All depths are read; what lies behind the new layer moves by one.
+    // What lies behind the new layer moves by one.
     let moved = (held - place) as u32;
     let written = (room.min(held + 1) - place) as u32;
-    probe.compared(held as u32);
-    probe.state(32 * held as u32 + (bits - 32) * moved, bits * written);
+    probe.state((bits - DEPTH_BITS) * moved, bits * written);
     list.insert(place, layer);
     (list.len() > room).then(|| list.pop()).flatten()
 }
@@ -216,8 +247,8 @@ impl<const N: usize> Layering<N> {
     /// As the parameters [`LAYERS`] and [`COVERAGE`] say: layers of a depth, a mask, a
     /// colour and an alpha.
     pub fn of(values: &Values, frame: &Frame) -> Self {
-        let columns = Columns::of(values);
-        let bits = 32 + columns.mask_bits() + frame.colour_bits + 32;
+        let columns = Columns::of(values, frame);
+        let bits = columns.fields().iter().map(|(bits, _)| bits).sum();
         Layering { columns, room: room(values), bits }
     }
 
@@ -231,9 +262,9 @@ impl<const N: usize> Layering<N> {
         insert(layers, self.room, layer, self.bits, probe)
     }
 
-    /// The state of all layers and `extra` bits.
-    pub fn state_bits(&self, extra: u32) -> StateBits {
-        StateBits { samples: 0, extra: self.room as u32 * self.bits + extra, unbounded: false }
+    /// What all layers hold.
+    pub fn layout(&self) -> Layout {
+        Layout::of(self.room as u32, &self.columns.fields())
     }
 
     /// The layers, near to far, over what lies behind them.

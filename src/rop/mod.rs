@@ -3,12 +3,14 @@
 
 pub mod accumulators;
 mod blend_buffer;
+pub mod colour;
 pub mod depth_bits;
 mod design;
 mod dither;
 mod event;
 pub mod fast;
 pub mod layers;
+mod layout;
 mod moments;
 mod normalise;
 mod opacity;
@@ -28,12 +30,16 @@ pub mod view_depth;
 
 pub use accumulators::{Accumulators, Coverage};
 pub use blend_buffer::BlendBuffer;
+pub use colour::ColourStore;
 pub use design::{
     Blueprint, Contents, Design, Family, Frame, Info, OpaquePromise, OrderPromise, Promises, Site,
     StateBits,
 };
 pub use dither::{BAYER, BLUE_NOISE, Dither, Ranks, TILE, stratified};
-pub use event::{EventCounts, NoProbe, Probe, Record, ReferenceRecord};
+pub use event::{
+    Event, EventCounts, Listen, NoProbe, Probe, Record, ReferenceRecord, network_comparators,
+};
+pub use layout::{Field as LayoutField, Group as LayoutGroup, Layout};
 pub use moments::{MomentCount, Moments};
 pub use normalise::{Normalise, Sums};
 pub use opacity::Threshold;

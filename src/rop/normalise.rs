@@ -2,7 +2,9 @@
 //! alpha correction and depth-based accumulation (Enderton et al. 2011, sections 3.3
 //! and 3.4; Sintorn and Assarsson 2009).
 
+use crate::rop::colour::ColourStore;
 use crate::rop::layers::Columns;
+use crate::rop::layout::Layout;
 use crate::rop::port::PixelWords;
 use crate::trace::SampleMask;
 
@@ -27,16 +29,14 @@ impl Normalise {
         matches!(self, Normalise::Depth | Normalise::Both)
     }
 
-    /// Bits of [`Sums`] over so many columns: a transmittance each, and one sum of
+    /// What [`Sums`] hold over so many columns: a transmittance each, and one sum of
     /// colours, with one of alphas where these are scaled.
-    pub fn touched_bits(self, columns: u32) -> u32 {
-        let scaled = u32::from(self == Normalise::Both);
-        32 * (u32::from(self.by_alpha()) * columns + u32::from(self.by_depth()) * 3 + scaled)
-    }
-
-    /// Bits of [`Sums`] per pixel.
-    pub fn state_bits(self, columns: usize) -> u32 {
-        self.touched_bits(columns as u32)
+    pub fn layout(self, columns: u32, store: ColourStore) -> Layout {
+        let columns = if self.by_alpha() { columns } else { 0 };
+        let colour = if self.by_depth() { store.colour_bits() } else { 0 };
+        let alpha = if self == Normalise::Both { store.channel_bits() } else { 0 };
+        Layout::of(columns, &[(store.channel_bits(), "transmittance")])
+            .and(1, &[(colour, "summed colour"), (alpha, "summed alpha")])
     }
 }
 
@@ -64,9 +64,11 @@ impl Sums {
     }
 
     /// Adds a fragment of which the columns that it covers show `visible`, all together.
+    #[expect(clippy::too_many_arguments, reason = "a fragment, and how it is summed")]
     pub fn add(
         &mut self,
         normalise: Normalise,
+        store: ColourStore,
         columns: usize,
         coverage: SampleMask,
         colour: [f32; 3],
@@ -75,13 +77,15 @@ impl Sums {
     ) {
         if normalise.by_alpha() {
             self.passes.resize(columns, 1.0);
-            coverage.iter().for_each(|s| self.passes[s] *= 1.0 - alpha);
+            for s in coverage.iter() {
+                self.passes[s] = store.channel(self.passes[s] * (1.0 - alpha));
+            }
         }
         let weight = visible as f32 * alpha;
         for (sum, c) in self.colour.iter_mut().zip(colour) {
-            *sum += weight * c;
+            *sum = store.channel(*sum + weight * c);
         }
-        self.alpha += weight;
+        self.alpha = store.channel(self.alpha + weight);
     }
 
     /// The pixel's colour over `behind`, where the layers by themselves show in a

@@ -7,8 +7,10 @@
 
 use crate::param::{Param, Values};
 use crate::resolve::box_filter;
-use crate::rop::design::{Contents, Design, Frame, Site, StateBits};
+use crate::rop::colour::ColourStore;
+use crate::rop::design::{Contents, Design, Frame, Site};
 use crate::rop::event::Probe;
+use crate::rop::layout::Layout;
 use crate::rop::port::{Constant, Declaration, OnDevice, PixelWords};
 use crate::rop::samples::Samples;
 use crate::trace::{Fragment, SampleMask, Unorm32};
@@ -30,6 +32,16 @@ pub fn of(values: &Values) -> Opaque {
     values.choice(PARAM.name)
 }
 
+/// How opaque fragments are drawn on this frame: where none come, as all others. No
+/// bit of the picture depends on that, only what it costs.
+pub fn on(values: &Values, frame: &Frame) -> Opaque {
+    needed(of(values), frame)
+}
+
+fn needed(opaque: Opaque, frame: &Frame) -> Opaque {
+    if frame.opaque { opaque } else { Opaque::Together }
+}
+
 /// How a design draws transparent fragments over what lies behind them.
 ///
 /// The methods are those of [`Design`] but for what is said here.
@@ -42,11 +54,15 @@ pub trait Transparent<const N: usize>: Send + Sync {
         1
     }
 
-    /// Bits of state of one pixel: a multisample buffer of its own, and others.
-    fn state_bits(&self) -> StateBits;
+    /// What a pixel holds beside the opaque z-buffer.
+    fn layout(&self) -> Layout;
 
     /// As [`Design::clear`].
     fn clear(&self, site: Site) -> Self::Pixel;
+
+    /// Is called before anything is drawn, with the opaque picture's samples, for what is
+    /// blended into these themselves.
+    fn over(&self, _pixel: &mut Self::Pixel, _behind: &[[f32; 3]; N]) {}
 
     /// As [`Design::draw`]; the fragment's coverage is what lies before the opaque
     /// geometry, and never empty.
@@ -60,7 +76,14 @@ pub trait Transparent<const N: usize>: Send + Sync {
     );
 
     /// As [`Design::end_pass`].
-    fn end_pass(&self, _pass: u32, _site: Site, _pixel: &mut Self::Pixel) {}
+    fn end_pass<P: Probe>(
+        &self,
+        _pass: u32,
+        _site: Site,
+        _pixel: &mut Self::Pixel,
+        _probe: &mut P,
+    ) {
+    }
 
     /// The pixel's linear colour over the opaque picture's samples `behind`.
     fn resolve(&self, site: Site, pixel: &Self::Pixel, behind: &[[f32; 3]; N]) -> [f64; 3];
@@ -79,13 +102,21 @@ pub trait Transparent<const N: usize>: Send + Sync {
 pub struct OverOpaque<T, const N: usize> {
     frame: Frame,
     opaque: Opaque,
+    colour: ColourStore,
     pub(in crate::rop) inner: T,
 }
 
 impl<T: Transparent<N>, const N: usize> OverOpaque<T, N> {
-    /// `inner` over opaque fragments that are drawn as `opaque` says.
-    pub fn new(frame: &Frame, opaque: Opaque, inner: T) -> Self {
-        OverOpaque { frame: frame.clone(), opaque, inner }
+    /// `inner` over opaque fragments that are drawn as `opaque` says, if any come, into a
+    /// buffer of colours as `values` have it.
+    pub fn new(values: &Values, frame: &Frame, opaque: Opaque, inner: T) -> Self {
+        let colour = ColourStore::of(values, frame);
+        OverOpaque { frame: frame.clone(), opaque: needed(opaque, frame), colour, inner }
+    }
+
+    /// Whether fragments' colours are stored as they are, as a fast engine stores them.
+    pub fn keeps_colours(&self) -> bool {
+        self.colour.keeps()
     }
 
     /// Passes over the trace before those of `inner`.
@@ -94,7 +125,7 @@ impl<T: Transparent<N>, const N: usize> OverOpaque<T, N> {
     }
 
     fn sample_bits(&self) -> u32 {
-        32 + self.frame.colour_bits
+        32 + self.colour.colour_bits()
     }
 
     /// Where opaque fragments come first: the samples of a fragment that `inner` is to
@@ -126,8 +157,9 @@ impl<T: Transparent<N>, const N: usize> OverOpaque<T, N> {
         }
         let samples =
             opaque.get_or_insert_with(|| Box::new(Samples::cleared(self.frame.background)));
+        let colour = self.colour.colour(fragment.colour);
         for s in passed.iter() {
-            samples.write(s, z[s], fragment.colour);
+            samples.write(s, z[s], colour);
         }
         probe.written(passed);
         probe.state(0, self.sample_bits() * passed.count());
@@ -149,16 +181,16 @@ impl<T: Transparent<N>, const N: usize> Design for OverOpaque<T, N> {
         self.own_passes() + self.inner.passes()
     }
 
-    fn state_bits(&self) -> StateBits {
-        let inner = self.inner.state_bits();
-        StateBits {
-            samples: inner.samples + self.own_passes() * N as u32 * self.sample_bits(),
-            ..inner
-        }
+    fn layout(&self) -> Layout {
+        let buffer = [(32, "opaque depth"), (self.colour.colour_bits(), "opaque colour")];
+        let first = self.own_passes() * N as u32;
+        Layout::samples(first, &buffer).joined(self.inner.layout())
     }
 
     fn clear(&self, site: Site) -> Self::Pixel {
-        OverOpaquePixel { opaque: None, inner: self.inner.clear(site) }
+        let mut inner = self.inner.clear(site);
+        self.inner.over(&mut inner, &[self.frame.background; N]);
+        OverOpaquePixel { opaque: None, inner }
     }
 
     #[inline]
@@ -179,9 +211,11 @@ impl<T: Transparent<N>, const N: usize> Design for OverOpaque<T, N> {
         }
     }
 
-    fn end_pass(&self, pass: u32, site: Site, pixel: &mut Self::Pixel) {
+    fn end_pass<P: Probe>(&self, pass: u32, site: Site, pixel: &mut Self::Pixel, probe: &mut P) {
         if let Some(pass) = pass.checked_sub(self.own_passes()) {
-            self.inner.end_pass(pass, site, &mut pixel.inner);
+            self.inner.end_pass(pass, site, &mut pixel.inner, probe);
+        } else if let Some(samples) = &pixel.opaque {
+            self.inner.over(&mut pixel.inner, &samples.colour);
         }
     }
 
@@ -213,6 +247,7 @@ where
     fn declare(&self, to: &mut Declaration) {
         let first = self.opaque == Opaque::First;
         to.constant("OPAQUE_FIRST_HERE", Constant::Flag(first));
+        to.constant("CHANNEL_BITS", Constant::Whole(self.colour.channel_bits()));
         let samples = if first { N as u32 } else { 0 };
         to.field("HAS_OPAQUE", u32::from(first));
         to.field("OPAQUE_DEPTH", samples);

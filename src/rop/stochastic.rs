@@ -10,11 +10,11 @@ use crate::error::Result;
 use crate::param::{Param, Values};
 use crate::random::hash;
 use crate::resolve::box_filter;
+use crate::rop::colour::ColourStore;
 use crate::rop::depth_bits;
-use crate::rop::design::{
-    Contents, Frame, Info, OpaquePromise, OrderPromise, Promises, Site, StateBits,
-};
+use crate::rop::design::{Contents, Frame, Info, OpaquePromise, OrderPromise, Promises, Site};
 use crate::rop::event::Probe;
+use crate::rop::layout::Layout;
 use crate::rop::over_opaque::{self, Opaque, OverOpaque, Transparent};
 use crate::rop::port::{Constant, Declaration, OnDevice, PixelWords, Port};
 use crate::rop::promise::Promise;
@@ -147,8 +147,10 @@ pub fn with_methods<S: Sampler<N>, const N: usize>(
         _ => over_opaque::of(values),
     };
     let depth_bits = depth_bits::of(values);
-    let methods = Methods { frame: frame.clone(), sampler, depth_bits, method, rounds, strata };
-    Ok(OverOpaque::new(frame, opaque, methods))
+    let colour = ColourStore::of(values, frame);
+    let methods =
+        Methods { frame: frame.clone(), sampler, depth_bits, colour, method, rounds, strata };
+    Ok(OverOpaque::new(values, frame, opaque, methods))
 }
 
 /// The design of `sampler` in a single pass, without the shared parameters but for
@@ -162,11 +164,12 @@ pub fn single_pass<S: Sampler<N>, const N: usize>(
         frame: frame.clone(),
         sampler,
         depth_bits: depth_bits::of(values),
+        colour: ColourStore::of(values, frame),
         method: Method::Basic,
         rounds: 1,
         strata: Strata::Round,
     };
-    OverOpaque::new(frame, Opaque::Together, methods)
+    OverOpaque::new(values, frame, Opaque::Together, methods)
 }
 
 /// The port of a design made by [`with_methods`]: without sums, a device resolves it, and
@@ -223,6 +226,14 @@ pub fn promises(values: &Values, basic: Promises) -> Promises {
     }
 }
 
+/// Whether these settings draw opaque fragments in a pass of their own.
+pub fn draws_opaque_first(values: &Values) -> bool {
+    let has = |name| values.iter().any(|(param, _)| param == name);
+    has(over_opaque::PARAM.name)
+        && over_opaque::of(values) == Opaque::First
+        && !(has(METHOD.name) && values.choice::<Method>(METHOD.name) == Method::Basic)
+}
+
 /// Whether several rounds are stratified together.
 pub fn strata_over_rounds(values: &Values) -> bool {
     values.choice::<Strata>(STRATA.name) == Strata::All
@@ -235,6 +246,7 @@ pub struct Methods<S, const N: usize> {
     pub(in crate::rop) frame: Frame,
     pub(in crate::rop) sampler: S,
     pub(in crate::rop) depth_bits: u32,
+    pub(in crate::rop) colour: ColourStore,
     pub(in crate::rop) method: Method,
     pub(in crate::rop) rounds: u32,
     strata: Strata,
@@ -264,11 +276,11 @@ pub(in crate::rop) struct Sums<const N: usize> {
 }
 
 impl<const N: usize> Sums<N> {
-    fn add(&mut self, colour: [f32; 3], weight: f32) {
+    fn add(&mut self, colour: [f32; 3], weight: f32, store: ColourStore) {
         for (sum, c) in self.colour.iter_mut().zip(colour) {
-            *sum += c * weight;
+            *sum = store.channel(*sum + c * weight);
         }
-        self.weight += weight;
+        self.weight = store.channel(self.weight + weight);
     }
 }
 
@@ -306,9 +318,15 @@ impl<S: Sampler<N>, const N: usize> Methods<S, N> {
         self.method != Method::Basic || self.rounds > 1
     }
 
-    /// Bits that a written sample takes: the depth-based methods store no colours.
+    /// What a sample holds: the depth-based methods store no colours.
+    fn sample(&self) -> [(u32, &'static str); 2] {
+        let colour = if self.method.depth_based() { 0 } else { self.colour.colour_bits() };
+        [(self.depth_bits, "depth"), (colour, "colour")]
+    }
+
+    /// Bits that a written sample takes.
     pub(in crate::rop) fn sample_bits(&self) -> u32 {
-        self.depth_bits + if self.method.depth_based() { 0 } else { self.frame.colour_bits }
+        self.sample().iter().map(|(bits, _)| bits).sum()
     }
 
     fn draw_samples<P: Probe>(
@@ -328,8 +346,9 @@ impl<S: Sampler<N>, const N: usize> Methods<S, N> {
         let round = self.round(round);
         let written =
             self.sampler.choose(round, site, state, &samples.depth, passed, fragment, probe);
+        let colour = self.colour.colour(fragment.colour);
         for s in written.iter() {
-            samples.write(s, z[s], fragment.colour);
+            samples.write(s, z[s], colour);
         }
         if let Some(sums) = sums {
             sums.occupied |= written;
@@ -346,9 +365,10 @@ impl<S: Sampler<N>, const N: usize> Methods<S, N> {
         probe: &mut P,
     ) {
         for s in fragment.coverage.iter() {
-            sums.transmittance[s] *= 1.0 - fragment.alpha;
+            let through = sums.transmittance[s] * (1.0 - fragment.alpha);
+            sums.transmittance[s] = self.colour.channel(through);
         }
-        let bits = 32 * fragment.coverage.count();
+        let bits = self.colour.channel_bits() * fragment.coverage.count();
         probe.state(bits, bits);
     }
 
@@ -362,10 +382,11 @@ impl<S: Sampler<N>, const N: usize> Methods<S, N> {
         probe: &mut P,
     ) {
         probe.depth_test(fragment.coverage, visible);
-        sums.add(fragment.colour, fragment.alpha * visible.count() as f32);
+        sums.add(fragment.colour, fragment.alpha * visible.count() as f32, self.colour);
         probe.written(visible);
         // One sum a pixel: with a box filter it holds what a multisample buffer would.
-        probe.state(self.depth_bits * fragment.coverage.count() + 128, 128);
+        let sum = self.colour.texel_bits();
+        probe.state(self.depth_bits * fragment.coverage.count() + sum, sum);
     }
 }
 
@@ -377,21 +398,21 @@ impl<S: Sampler<N>, const N: usize> Transparent<N> for Methods<S, N> {
         u32::from(self.method.corrected()) + self.rounds * of_a_round
     }
 
-    fn state_bits(&self) -> StateBits {
+    fn layout(&self) -> Layout {
         let samples = N as u32;
+        let channel = self.colour.channel_bits();
         let transmittance = match self.method {
             Method::Basic => 0,
-            Method::AlphaCorrection => 32 + 1,
-            Method::DepthCorrection => 32,
+            Method::AlphaCorrection | Method::DepthCorrection => channel,
             // How often the sample stayed empty.
             Method::Depth => self.rounds.ilog2() + 1,
         };
-        let sums = if self.method.depth_based() || self.rounds > 1 { 4 * 32 } else { 0 };
-        StateBits {
-            samples: samples * self.sample_bits(),
-            extra: self.sampler.state_bits() + samples * transmittance + sums,
-            unbounded: false,
-        }
+        let occupied = u32::from(self.method == Method::AlphaCorrection);
+        let sums = u32::from(self.method.depth_based() || self.rounds > 1);
+        Layout::samples(samples, &self.sample())
+            .and(1, &[(self.sampler.state_bits(), "tracking")])
+            .and(samples, &[(transmittance, "transmittance"), (occupied, "occupied")])
+            .and(sums, &[(self.colour.colour_bits(), "summed colour"), (channel, "weight")])
     }
 
     fn clear(&self, site: Site) -> Self::Pixel {
@@ -436,7 +457,7 @@ impl<S: Sampler<N>, const N: usize> Transparent<N> for Methods<S, N> {
     }
 
     /// Adds a finished round to the sums.
-    fn end_pass(&self, pass: u32, site: Site, pixel: &mut Self::Pixel) {
+    fn end_pass<P: Probe>(&self, pass: u32, site: Site, pixel: &mut Self::Pixel, _probe: &mut P) {
         let MethodsPixel { samples, state, sums: Some(sums) } = pixel else { return };
         let round = match (self.pass(pass), self.method.depth_based()) {
             (Pass::Sample(round), false) | (Pass::Accumulate(round), true) => round,
@@ -445,10 +466,10 @@ impl<S: Sampler<N>, const N: usize> Transparent<N> for Methods<S, N> {
         match self.method {
             // The weight counts what was written: where that is nothing, see `resolve`.
             Method::Basic => samples.colour.iter().enumerate().for_each(|(s, c)| {
-                sums.add(*c, if sums.occupied.contains(s) { 1.0 } else { 0.0 });
+                sums.add(*c, if sums.occupied.contains(s) { 1.0 } else { 0.0 }, self.colour);
             }),
             Method::AlphaCorrection => {
-                sums.occupied.iter().for_each(|s| sums.add(samples.colour[s], 1.0));
+                sums.occupied.iter().for_each(|s| sums.add(samples.colour[s], 1.0, self.colour));
             }
             Method::Depth => {
                 for s in (0..N).filter(|s| !sums.occupied.contains(*s)) {

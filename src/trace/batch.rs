@@ -168,6 +168,11 @@ impl Batch {
         }
     }
 
+    /// Whether any of its fragments is opaque: has an alpha of 1.
+    pub fn has_opaque(&self) -> bool {
+        self.alpha.stored().iter().any(|alpha| *alpha >= 1.0)
+    }
+
     /// All fragments in order.
     pub fn iter(&self) -> impl Iterator<Item = Fragment> + '_ {
         (0..self.len).map(|i| self.fragment(i))

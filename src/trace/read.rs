@@ -4,11 +4,12 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use arrow_buffer::Buffer;
 use bytes::Bytes;
 use memmap2::MmapOptions;
+use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
@@ -47,6 +48,8 @@ struct Inner {
     block_rows: Vec<u64>,
     rows: u64,
     seal: Option<Seal>,
+    /// Whether there is an opaque fragment, once somebody asked.
+    opaque: OnceLock<bool>,
 }
 
 /// What a trace's checksums cover.
@@ -198,6 +201,7 @@ impl Trace {
             block_rows,
             rows,
             seal,
+            opaque: OnceLock::new(),
         };
         Ok(Trace { inner: Arc::new(inner) })
     }
@@ -320,6 +324,28 @@ impl Trace {
     /// All batches in order.
     pub fn batches(&self) -> impl Iterator<Item = Result<Batch>> + '_ {
         (0..self.batch_count()).map(|i| self.batch(i))
+    }
+
+    /// Whether any fragment is opaque: has an alpha of 1. Found once, in a pass that ends at
+    /// the first such batch; where alpha is constant, in none.
+    ///
+    /// # Errors
+    /// As [`Trace::batch`].
+    pub fn has_opaque(&self) -> Result<bool> {
+        if let Some(known) = self.inner.opaque.get() {
+            return Ok(*known);
+        }
+        let has = match self.inner.header.constants.get(&ColumnId::Alpha) {
+            Some(_) if self.rows() == 0 => false,
+            Some(_) => self.batch(0)?.has_opaque(),
+            // In parallel, as it may be all that reads the trace before it is drawn.
+            None => (0..self.batch_count())
+                .into_par_iter()
+                .map(|i| Ok(self.batch(i)?.has_opaque()))
+                .find_first(|found| !matches!(found, Ok(false)))
+                .unwrap_or(Ok(false))?,
+        };
+        Ok(*self.inner.opaque.get_or_init(|| has))
     }
 
     /// Reads the whole trace and compares its content with the hash it was

@@ -166,8 +166,9 @@ fn what_is_counted_is_what_is_explained() {
         let mut explained = EventCounts::default();
         for (x, y) in (0..5).flat_map(|x| (0..4).map(move |y| (x, y))) {
             let pixel = design.explain(&trace, 8, 3, Site { x, y }, &|_, _| ()).unwrap();
-            for record in pixel.steps.iter().map(|step| &step.record) {
-                explained.fragments += 1;
+            explained.fragments += pixel.steps.len() as u64;
+            let steps = pixel.steps.iter().map(|step| &step.record);
+            for record in steps.chain(&pixel.ended) {
                 explained.samples_tested += u64::from(record.samples_tested);
                 explained.samples_passed += u64::from(record.samples_passed);
                 explained.samples_written += u64::from(record.written.count());

@@ -87,8 +87,8 @@ fn run(
             engine.draw(pass, &mut counted, &part, Told::Counts(&mut counts));
             engine.draw(pass, &mut uncounted, &part, Told::Nobody);
         }
-        engine.end_pass(pass, grid, tile, &mut counted);
-        engine.end_pass(pass, grid, tile, &mut uncounted);
+        engine.end_pass(pass, grid, tile, &mut counted, Told::Counts(&mut counts));
+        engine.end_pass(pass, grid, tile, &mut uncounted, Told::Nobody);
         for within in 0..5 {
             held.push(engine.contents(&counted, within));
             held.push(engine.contents(&uncounted, within));

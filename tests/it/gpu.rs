@@ -51,7 +51,7 @@ fn by_plain_text(design: &Configured, trace: &Trace, frame: &Frame) -> Found {
             for block in Block::all_of(&list) {
                 engine.draw(pass, &mut state, &block, Told::Nobody);
             }
-            engine.end_pass(pass, frame.grid, tile, &mut state);
+            engine.end_pass(pass, frame.grid, tile, &mut state, Told::Nobody);
         }
         (tile, (0..256).map(|i| engine.contents(&state, i)).collect())
     });

@@ -3,6 +3,7 @@
 mod blended;
 mod browser;
 mod cli;
+mod comparisons;
 mod conformance;
 mod events;
 mod fast;

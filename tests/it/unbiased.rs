@@ -16,8 +16,8 @@ use screendoor::param::Values;
 use screendoor::picture::Picture;
 use screendoor::random::{Stream, hash};
 use screendoor::rop::{
-    Blueprint, Contents, Design, Family, Frame, Info, OpaquePromise, OrderPromise, Probe, Promise,
-    Promises, Samples, Site, StateBits, Threshold,
+    Blueprint, Contents, Design, Family, Frame, Info, Layout, OpaquePromise, OrderPromise, Probe,
+    Promise, Promises, Samples, Site, Threshold,
 };
 use screendoor::tile::TileGrid;
 use screendoor::trace::{DepthPlane, Fragment, Header, SampleMask, Trace, Unorm32, tied_fragments};
@@ -428,8 +428,8 @@ impl Blueprint for Planted {
 
 impl Design for PlantedAt {
     type Pixel = Samples<8>;
-    fn state_bits(&self) -> StateBits {
-        StateBits::default()
+    fn layout(&self) -> Layout {
+        Layout::default()
     }
     fn clear(&self, _: Site) -> Samples<8> {
         Samples::cleared(self.frame.background)

@@ -14,7 +14,7 @@ use crate::rop::stochastic::{self, COMBINATIONS, METHOD, OPAQUE, ROUNDS, STRATA}
 use crate::rop::{
     Blueprint, Declaration, Dither, Engine, Family, Frame, Info, OnDevice, OpaquePromise,
     OrderPromise, PixelOrder, PixelWords, Port, Probe, Promise, Promises, Reference, ReferenceKey,
-    Round, Sampler, Site, Stochastic, Threshold, depth_bits, random_subset, stratified,
+    Round, Sampler, Site, Stochastic, Threshold, colour, depth_bits, random_subset, stratified,
 };
 use crate::tile::TileGrid;
 use crate::trace::{Fragment, MAX_SAMPLES, SampleMask, Unorm32};
@@ -70,6 +70,7 @@ impl Blueprint for Enderton {
             STRATA,
             OPAQUE,
             depth_bits::PARAM,
+            colour::PARAM,
         ],
         combinations: &COMBINATIONS_OF_ENDERTON,
     };
@@ -96,6 +97,9 @@ impl Blueprint for Enderton {
             return Ok(None);
         };
         let plain = Self::at::<N>(values, frame)?;
+        if !plain.keeps_colours() {
+            return Ok(None);
+        }
         Ok(Some(Box::new(FastEngine::new(plain, sampler, level))))
     }
 

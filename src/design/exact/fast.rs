@@ -7,7 +7,7 @@ use fearless_simd::{Level, Simd, dispatch};
 use crate::design::exact::lanes::{Composite, Depths, LANES, Offsets, Row, covers, depth_at, row};
 use crate::design::exact::order::{CHUNK, insert_in_order, keep, rank, shorten};
 use crate::design::exact::tell;
-use crate::rop::{Contents, Engine, Frame, Probe, StateBits, TileState, Told};
+use crate::rop::{Contents, Engine, Frame, Layout as StateLayout, Probe, TileState, Told};
 use crate::tile::{TILE_PIXELS, TileGrid, TileId};
 use crate::trace::{Block, DepthPlane, SampleMask};
 
@@ -45,8 +45,8 @@ impl Engine for Fast {
         self.reference.passes()
     }
 
-    fn state_bits(&self) -> StateBits {
-        self.reference.state_bits()
+    fn layout(&self) -> StateLayout {
+        self.reference.layout()
     }
 
     fn bytes_per_fragment(&self) -> Option<usize> {
@@ -75,7 +75,7 @@ impl Engine for Fast {
         }));
     }
 
-    fn end_pass(&self, _pass: u32, _grid: TileGrid, _tile: TileId, _state: &mut TileState) {}
+    fn end_pass(&self, _: u32, _: TileGrid, _: TileId, _: &mut TileState, _: Told<'_>) {}
 
     fn resolve(&self, _grid: TileGrid, _tile: TileId, state: &TileState) -> Box<Pixels> {
         let layers = state.downcast_ref::<Vec<Layer>>().expect("the state is the engine's own");

@@ -11,8 +11,8 @@ use crate::error::Result;
 use crate::param::Values;
 use crate::rop::fast::{Count, Width};
 use crate::rop::{
-    Blueprint, Contents, Design, Engine, Family, Frame, Info, OpaquePromise, OrderPromise, Probe,
-    Promise, Promises, Site, StateBits,
+    Blueprint, Contents, Design, Engine, Family, Frame, Info, Layout, OpaquePromise, OrderPromise,
+    Probe, Promise, Promises, Site,
 };
 use crate::trace::{DepthPlane, Fragment, SampleMask};
 
@@ -64,11 +64,16 @@ pub struct ExactAt<const N: usize> {
     frame: Frame,
 }
 
+/// What is kept of a fragment: all of it, as the trace has it.
+fn fields(frame: &Frame) -> [(u32, &'static str); 4] {
+    let colour = (frame.colour_bits, "colour");
+    [(frame.samples(), "coverage"), (3 * 32, "depth plane"), colour, (32, "alpha")]
+}
+
 /// What keeping a fragment costs.
 fn tell<P: Probe>(frame: &Frame, fragment: &Fragment, probe: &mut P) {
     probe.written(fragment.coverage);
-    // Its coverage, its depth plane, its colour and its alpha.
-    probe.state(0, frame.samples() + 3 * 32 + frame.colour_bits + 32);
+    probe.state(0, fields(frame).iter().map(|(bits, _)| bits).sum());
 }
 
 /// What is kept of a fragment.
@@ -84,8 +89,8 @@ impl<const N: usize> Design for ExactAt<N> {
     /// All fragments, in API order.
     type Pixel = Vec<Layer>;
 
-    fn state_bits(&self) -> StateBits {
-        StateBits { samples: 0, extra: 0, unbounded: true }
+    fn layout(&self) -> Layout {
+        Layout::of_each_fragment(&fields(&self.frame))
     }
 
     fn clear(&self, _site: Site) -> Vec<Layer> {

@@ -19,6 +19,7 @@ fn frame(samples: u32, random: &mut Stream) -> Frame {
         background: [0.25, -3.0, 1e30],
         seed: 0,
         colour_bits: 48,
+        opaque: true,
         primitive_depths: None,
     }
 }
@@ -116,7 +117,7 @@ fn drawn(engine: &dyn Engine, frame: &Frame, fragments: &[Fragment]) -> (TileSta
     for part in std::iter::once(first).chain(rest.chunks(64)).flat_map(Block::all_of) {
         engine.draw(0, &mut state, &part, Told::Counts(&mut counts));
     }
-    engine.end_pass(0, frame.grid, TILE, &mut state);
+    engine.end_pass(0, frame.grid, TILE, &mut state, Told::Nobody);
     (state, counts)
 }
 

@@ -4,15 +4,16 @@ use fearless_simd::{Level, Simd};
 
 use crate::picture::TilePixels;
 use crate::resolve::box_filter;
-use crate::rop::design::{Contents, Design, Frame, Site, StateBits};
-use crate::rop::event::{NoProbe, Probe};
+use crate::rop::design::{Contents, Design, Frame, Site};
+use crate::rop::event::{NoProbe, Probe, Sum};
 use crate::rop::fast::kernel;
 use crate::rop::fast::lanes::{Count, Lanes, Width};
 use crate::rop::fast::references::Limit;
 use crate::rop::fast::state::{FastTile, PlainPixel, boxed};
 use crate::rop::fast::tally::Tally;
+use crate::rop::layout::Layout;
 use crate::rop::over_opaque::Transparent;
-use crate::rop::replay::{Engine, TileState, Told, sites};
+use crate::rop::replay::{Engine, Listener, TileState, Told, sites};
 use crate::rop::stochastic::{Pass, Round, Sampler, Stochastic};
 use crate::tile::{TILE_PIXELS, TileGrid, TileId};
 use crate::trace::{Block, Fragment, SampleMask};
@@ -215,13 +216,7 @@ where
         tile.set(&self.sampler, within, pixel);
     }
 
-    fn draw_all<P: Probe>(
-        &self,
-        pass: u32,
-        tile: &mut FastTile<F, N>,
-        block: &Block,
-        probe: &mut P,
-    ) {
+    fn draw_all<P: Sum>(&self, pass: u32, tile: &mut FastTile<F, N>, block: &Block, probe: &mut P) {
         let methods = &self.plain.inner;
         let Some(inner) = pass.checked_sub(self.plain.own_passes()) else {
             for fragment in block.iter() {
@@ -254,7 +249,7 @@ where
         }
     }
 
-    fn draw_samples<P: Probe>(
+    fn draw_samples<P: Sum>(
         &self,
         pass: u32,
         round: Round,
@@ -312,8 +307,8 @@ where
         Design::passes(&self.plain)
     }
 
-    fn state_bits(&self) -> StateBits {
-        Design::state_bits(&self.plain)
+    fn layout(&self) -> Layout {
+        Design::layout(&self.plain)
     }
 
     fn bytes_per_fragment(&self) -> Option<usize> {
@@ -343,13 +338,23 @@ where
         }
     }
 
-    fn end_pass(&self, pass: u32, grid: TileGrid, tile: TileId, state: &mut TileState) {
+    fn end_pass(
+        &self,
+        pass: u32,
+        grid: TileGrid,
+        tile: TileId,
+        state: &mut TileState,
+        told: Told<'_>,
+    ) {
         let state = own::<F, N>(state);
         if state.sums.is_empty() {
             return;
         }
+        let mut listener = Listener(told);
         for (within, site) in sites(grid, tile).enumerate() {
-            self.change(state, within, |pixel| Design::end_pass(&self.plain, pass, site, pixel));
+            self.change(state, within, |pixel| {
+                Design::end_pass(&self.plain, pass, site, pixel, &mut listener);
+            });
         }
     }
 

@@ -3,7 +3,7 @@
 use fearless_simd::Simd;
 
 use crate::rop::design::Frame;
-use crate::rop::event::Probe;
+use crate::rop::event::{Probe, Sum};
 #[cfg(test)]
 use crate::rop::fast::engine::Flaw;
 use crate::rop::fast::engine::{FastEngine, FastSampler, Loaded, Offered, Row};
@@ -96,7 +96,7 @@ impl Prepared {
 /// Draws the fragments of one round: [`Methods::draw`](crate::rop::Transparent::draw)
 /// for a pass of samples.
 #[inline(always)]
-pub(super) fn draw_samples<S: Simd, F: FastSampler<N>, P: Probe, const N: usize>(
+pub(super) fn draw_samples<S: Simd, F: FastSampler<N>, P: Sum, const N: usize>(
     simd: S,
     engine: &FastEngine<F, N>,
     pass: u32,

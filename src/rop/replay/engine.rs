@@ -5,10 +5,10 @@ use std::any::Any;
 
 use crate::picture::TilePixels;
 use crate::rop::design::{Contents, Design, Site, StateBits};
-use crate::rop::event::{EventCounts, NoProbe, Probe, Record};
-use crate::rop::opacity::Threshold;
+use crate::rop::event::{Event, EventCounts, Listen, NoProbe, Probe, Record};
+use crate::rop::layout::Layout;
 use crate::tile::{TILE_PIXELS, TileGrid, TileId};
-use crate::trace::{Block, SampleMask};
+use crate::trace::Block;
 
 /// The pixels of a tile as their design holds them.
 pub type TileState = Box<dyn Any + Send>;
@@ -17,8 +17,12 @@ pub type TileState = Box<dyn Any + Send>;
 pub trait Engine: Send + Sync {
     /// As [`Design::passes`].
     fn passes(&self) -> u32;
-    /// As [`Design::state_bits`].
-    fn state_bits(&self) -> StateBits;
+    /// As [`Design::layout`].
+    fn layout(&self) -> Layout;
+    /// Its bits.
+    fn state_bits(&self) -> StateBits {
+        self.layout().bits()
+    }
     /// As [`Design::bytes_per_fragment`].
     fn bytes_per_fragment(&self) -> Option<usize>;
     /// A cleared tile.
@@ -26,7 +30,14 @@ pub trait Engine: Send + Sync {
     /// Draws fragments of one tile, in this order; rows that cover nothing are none.
     fn draw(&self, pass: u32, state: &mut TileState, fragments: &Block, told: Told<'_>);
     /// Ends a pass for a tile.
-    fn end_pass(&self, pass: u32, grid: TileGrid, tile: TileId, state: &mut TileState);
+    fn end_pass(
+        &self,
+        pass: u32,
+        grid: TileGrid,
+        tile: TileId,
+        state: &mut TileState,
+        told: Told<'_>,
+    );
     /// The colours of a tile.
     fn resolve(&self, grid: TileGrid, tile: TileId, state: &TileState) -> TilePixels;
     /// What a tile's pixel holds; `within` is its place in the tile.
@@ -49,8 +60,8 @@ impl<D: Design> Engine for D {
         Design::passes(self)
     }
 
-    fn state_bits(&self) -> StateBits {
-        Design::state_bits(self)
+    fn layout(&self) -> Layout {
+        Design::layout(self)
     }
 
     fn bytes_per_fragment(&self) -> Option<usize> {
@@ -73,10 +84,18 @@ impl<D: Design> Engine for D {
         }
     }
 
-    fn end_pass(&self, pass: u32, grid: TileGrid, tile: TileId, state: &mut TileState) {
+    fn end_pass(
+        &self,
+        pass: u32,
+        grid: TileGrid,
+        tile: TileId,
+        state: &mut TileState,
+        told: Told<'_>,
+    ) {
         let pixels = state.downcast_mut::<Vec<D::Pixel>>().expect("the state is the design's own");
+        let mut listener = Listener(told);
         for (site, pixel) in sites(grid, tile).zip(pixels) {
-            Design::end_pass(self, pass, site, pixel);
+            Design::end_pass(self, pass, site, pixel, &mut listener);
         }
     }
 
@@ -120,31 +139,15 @@ pub(in crate::rop) fn sites(grid: TileGrid, tile: TileId) -> impl Iterator<Item 
 }
 
 /// One probe for all who listen: designs are compiled for it and for nobody.
-struct Listener<'a>(Told<'a>);
+pub(in crate::rop) struct Listener<'a>(pub Told<'a>);
 
-/// Passes a call on to whoever listens.
-macro_rules! pass_on {
-    ($($method:ident($($name:ident: $type:ty),*);)+) => {
-        impl Probe for Listener<'_> {
-            $(#[inline(never)]
-            fn $method(&mut self, $($name: $type),*) {
-                match &mut self.0 {
-                    Told::Nobody => {}
-                    Told::Counts(counts) => counts.$method($($name),*),
-                    Told::Record(record) => record.$method($($name),*),
-                }
-            })+
+impl Listen for Listener<'_> {
+    #[inline(never)]
+    fn event(&mut self, event: Event<'_>) {
+        match &mut self.0 {
+            Told::Nobody => {}
+            Told::Counts(counts) => counts.event(event),
+            Told::Record(record) => record.event(event),
         }
-    };
-}
-
-pass_on! {
-    fragment(covered: SampleMask);
-    depth_test(tested: SampleMask, passed: SampleMask);
-    surface(number: u32);
-    sorted(order: &[u8]);
-    reference(sample: u8, number: u32, value: u32, threshold: Threshold);
-    hashed(count: u32);
-    written(samples: SampleMask);
-    state(read: u32, written: u32);
+    }
 }

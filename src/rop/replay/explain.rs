@@ -29,6 +29,8 @@ pub struct Explanation {
     pub cleared: Contents,
     /// Its fragments in API order, pass after pass.
     pub steps: Vec<Step>,
+    /// What was done at the end of each pass, when no fragment was left.
+    pub ended: Vec<Record>,
     /// The pixel's linear colour.
     pub colour: [f64; 3],
 }
@@ -69,7 +71,7 @@ pub fn explain(
     let (tile, within) = (frame.grid.tile(site.x, site.y), TileGrid::within(site.x, site.y));
     let mut state = design.clear(frame.grid, tile);
     let cleared = design.contents(&state, within);
-    let mut steps = Vec::new();
+    let (mut steps, mut ended) = (Vec::new(), Vec::new());
     for pass in 0..design.passes() {
         for (row, fragment) in &fragments {
             let mut record = Record::default();
@@ -79,10 +81,12 @@ pub fn explain(
             let contents = design.contents(&state, within);
             steps.push(Step { pass, row: *row, fragment: *fragment, record, contents });
         }
-        design.end_pass(pass, frame.grid, tile, &mut state);
+        let mut record = Record::default();
+        design.end_pass(pass, frame.grid, tile, &mut state, Told::Record(&mut record));
+        ended.push(record);
     }
     let colour = design.resolve(frame.grid, tile, &state)[within];
-    Ok(Explanation { cleared, steps, colour })
+    Ok(Explanation { cleared, steps, ended, colour })
 }
 
 /// Draws fragments into one pixel, for tests of designs.
@@ -92,7 +96,7 @@ pub fn draw_pixel<D: Design>(design: &D, site: Site, fragments: &[Fragment]) -> 
         for fragment in fragments {
             design.draw(pass, site, &mut pixel, fragment, &mut NoProbe);
         }
-        design.end_pass(pass, site, &mut pixel);
+        design.end_pass(pass, site, &mut pixel, &mut NoProbe);
     }
     pixel
 }

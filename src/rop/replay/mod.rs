@@ -19,8 +19,8 @@ mod window;
 use fearless_simd::Level;
 use rayon::prelude::*;
 
-pub(in crate::rop) use engine::sites;
 pub use engine::{Engine, TileState, Told};
+pub(in crate::rop) use engine::{Listener, sites};
 pub use explain::{Explanation, Step, draw_pixel, explain};
 
 use crate::error::{Error, Result};
@@ -29,6 +29,7 @@ use crate::picture::{Picture, TilePixels};
 use crate::rop::design::{Frame, StateBits};
 use crate::rop::event::EventCounts;
 use crate::rop::fast::levels;
+use crate::rop::layout::Layout;
 use crate::rop::replay::group::{Group, group_tiles};
 use crate::rop::replay::window::{Window, Windows};
 use crate::tile::{TileId, TileMap};
@@ -108,6 +109,8 @@ pub struct Replayed {
     pub events: Option<EventCounts>,
     /// State per pixel.
     pub state_bits: StateBits,
+    /// How it is made up.
+    pub layout: Layout,
     /// How many times the design read the trace.
     pub passes: u32,
     /// Tiles that at least one fragment touched.
@@ -151,12 +154,8 @@ pub fn replay(
                 more = filled?;
                 std::mem::swap(&mut window, &mut ahead);
             }
-            let tiles = states.touched_mut().par_iter_mut();
-            tiles.for_each(|(tile, state)| {
-                if let Some(state) = state {
-                    design.end_pass(pass, grid, *tile, state);
-                }
-            });
+            let ended = end_pass(design, pass, &mut states, options.count_events);
+            events = events.map(|events| events.merged(&ended));
         }
         let resolved = states.filter_map(|tiles| {
             // A tile without a state was met by nothing that covers a sample.
@@ -172,9 +171,34 @@ pub fn replay(
         picture: Picture::from_tiles(frame.background.map(f64::from), finished),
         events,
         state_bits: design.state_bits(),
+        layout: design.layout(),
         passes: design.passes(),
         touched_tiles,
     })
+}
+
+/// Ends a pass in all touched tiles; counts events where it is asked to.
+fn end_pass(
+    design: &dyn Engine,
+    pass: u32,
+    states: &mut TileMap<Option<TileState>>,
+    count: bool,
+) -> EventCounts {
+    let grid = states.grid();
+    let end = |(tile, state): &mut (TileId, Option<TileState>)| {
+        let mut counts = count.then(EventCounts::default);
+        if let Some(state) = state {
+            let told = counts.as_mut().map_or(Told::Nobody, Told::Counts);
+            design.end_pass(pass, grid, *tile, state, told);
+        }
+        counts
+    };
+    let merge = |a: Option<EventCounts>, b: Option<EventCounts>| match (a, b) {
+        (Some(a), Some(b)) => Some(a.merged(&b)),
+        (a, b) => a.or(b),
+    };
+    let tiles = states.touched_mut().par_iter_mut();
+    tiles.map(end).reduce(|| None, merge).unwrap_or_default()
 }
 
 /// Adds a group's tiles to the finished ones; of a tile that is done in parts,

@@ -23,8 +23,6 @@ pub struct Contender {
     counted: Vec<(&'static str, u32)>,
     /// Whether the application must sort for it.
     pub sorted_by_application: bool,
-    /// Whether it can do without a z-buffer for opaque fragments.
-    opaque_apart: bool,
 }
 
 /// Parameters whose every value makes a contender of its own: they name methods.
@@ -67,20 +65,14 @@ impl Contender {
             settings,
             counted,
             sorted_by_application: entry.asks_for_primitive_depths(),
-            opaque_apart: has(crate::rop::over_opaque::PARAM.name),
         }
     }
 
-    /// The design for `count` samples or layers, with a z-buffer for opaque fragments
-    /// where the scene has any.
-    pub(super) fn at(&self, count: u32, has_opaque: bool) -> Result<Configured> {
+    /// The design for `count` samples or layers.
+    pub(super) fn at(&self, count: u32) -> Result<Configured> {
         let mut settings = self.settings.clone();
         let counted = |(name, times): &(&str, u32)| (name.to_string(), (times * count).to_string());
         settings.extend(self.counted.iter().map(counted));
-        if self.opaque_apart && !has_opaque {
-            settings
-                .push((crate::rop::over_opaque::PARAM.name.to_string(), "together".to_string()));
-        }
         configure(self.name, &settings)
     }
 }
@@ -137,9 +129,7 @@ mod tests {
         }
         for contender in &list {
             for count in COUNTS {
-                for has_opaque in [true, false] {
-                    contender.at(count, has_opaque).unwrap();
-                }
+                contender.at(count).unwrap();
             }
         }
         assert!(list.len() > DESIGNS.len());

@@ -13,7 +13,7 @@ use crate::capture::{Capture, CaptureOptions, Faces, Order, PatternKind};
 use crate::design::{REFERENCE, configure};
 use crate::error::Result;
 use crate::metrics::{Ensemble, EnsembleErrors, PixelClasses};
-use crate::rop::{Frame, ReplayOptions};
+use crate::rop::ReplayOptions;
 use crate::scene::{self, Scene};
 use crate::study::comparison::contenders::claimed;
 use crate::study::publications::claims::{Trial, dial};
@@ -251,7 +251,6 @@ fn compared(
     mut progress: impl FnMut(usize),
 ) -> Result<ComparedScene> {
     let statistics = statistics(trace, |_| ())?;
-    let has_opaque = statistics.alpha.opaque > 0;
     let options = ReplayOptions { memory: 1 << 30, ..ReplayOptions::default() };
     let exact = configure(REFERENCE, &[])?;
     let mut references = Vec::new();
@@ -263,16 +262,14 @@ fn compared(
     for (contender, spec) in contenders.iter().enumerate() {
         progress(contender);
         for (count, reference, covered) in references.iter().filter(|(n, ..)| wanted(spec, *n)) {
-            let design = spec.at(*count, has_opaque)?;
+            let design = spec.at(*count)?;
             let seeds = if design.promises().seeded { seeds } else { 1 };
             let mut ensemble = Ensemble::new(reference, &[covered]);
-            let mut passes = 0;
             for seed in 0..seeds {
-                let replayed = design.replay(trace, *count, seed, &options)?;
-                ensemble.add(&replayed.picture);
-                passes = replayed.passes;
+                ensemble.add(&design.replay(trace, *count, seed, &options)?.picture);
             }
-            let bits = design.state_bits(&Frame::of(trace, *count, 0)?)?;
+            let engine = design.build(&design.frame(trace, *count, 0)?, options.engine)?;
+            let (bits, passes) = (engine.state_bits(), engine.passes());
             results.push(Outcome {
                 contender,
                 count: *count,
