@@ -238,7 +238,11 @@ impl Serialize for Value {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
             Value::Flag(v) => serializer.serialize_bool(*v),
-            Value::Choice { name, .. } => serializer.serialize_str(name),
+            // Some choices are between numbers.
+            Value::Choice { name, .. } => match name.parse::<i64>() {
+                Ok(number) => serializer.serialize_i64(number),
+                Err(_) => serializer.serialize_str(name),
+            },
             Value::Integer(v) => serializer.serialize_i64(*v),
             Value::Real(v) => serializer.serialize_f64(*v),
         }
@@ -418,6 +422,8 @@ mod tests {
         assert_eq!(values, right);
         let defaults: Vec<_> = PARAMS.iter().map(|p| serde_json::to_value(p).unwrap()).collect();
         assert_eq!(defaults[2]["default"], 3);
+        let bits = Value::Choice { index: 0, name: "32" };
+        assert_eq!(serde_json::to_value(bits).unwrap(), 32);
         assert_eq!((&defaults[2]["type"], &defaults[2]["max"]), (&"integer".into(), &9.into()));
         assert_eq!((&defaults[0]["default"], &defaults[3]["default"]), (&true.into(), &0.5.into()));
     }

@@ -23,7 +23,8 @@ mod verify;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::error::{ContextKind, ContextValue};
+use clap::{CommandFactory, Parser, Subcommand};
 
 use crate::cli::console::Console;
 use crate::error::{Error, Result};
@@ -68,7 +69,16 @@ enum Command {
 /// Exit codes: 0 for success; 1 where something could not be done or a file is
 /// bad; 2 where the command line asks for what cannot be.
 pub fn main() -> ExitCode {
-    let arguments = Arguments::parse();
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => match command_in_another_case(&error) {
+            Some(error) => {
+                Console::new(false).error(&error);
+                return ExitCode::from(2);
+            }
+            None => error.exit(),
+        },
+    };
     let console = Console::new(arguments.quiet);
     signals::clean_up(arguments.quiet);
     match run(&arguments, &console) {
@@ -80,6 +90,17 @@ pub fn main() -> ExitCode {
         }
     }
     ExitCode::from(if console.has_failed() { 1 } else { 0 })
+}
+
+/// The error about a command whose letters are of another case, of which clap suggests none.
+fn command_in_another_case(error: &clap::Error) -> Option<Error> {
+    let Some(ContextValue::String(given)) = error.get(ContextKind::InvalidSubcommand) else {
+        return None;
+    };
+    let command = Arguments::command();
+    let mut names = command.get_subcommands().map(clap::Command::get_name);
+    let found = names.find(|name| name.eq_ignore_ascii_case(given))?;
+    Some(Error::unknown("command", given, [found]))
 }
 
 fn run(arguments: &Arguments, console: &Console) -> Result<()> {

@@ -465,12 +465,14 @@ mod tests {
 
     #[test]
     fn what_is_left_out_never_contradicts_what_is_given() {
+        // Without the design that takes no count.
+        let any = SMALL.replace(", 'kbuffer:layers={n}'", "");
         for count in [1, 2, 4, 8, 16, 32, 64] {
-            let text = SMALL.replace("[4, 8]", &format!("[{count}]"));
+            let text = any.replace("[4, 8]", &format!("[{count}]"));
             assert_eq!(Study::parse(&text, "a.toml").unwrap().pictures, [count]);
         }
         for (samples, pictures) in [("[4, 16]", 4), ("[64, 2]", 2), ("[4, 8, 16]", 8)] {
-            let text = SMALL.replace("[4, 8]", samples);
+            let text = any.replace("[4, 8]", samples);
             assert_eq!(Study::parse(&text, "a.toml").unwrap().pictures, [pictures]);
         }
         let none = SMALL.replace("samples =", "pictures = []\nsamples =");

@@ -214,7 +214,8 @@ fn what_cannot_be_done_is_missing_and_the_rest_goes_on() {
     place.good(&["capture", "builtin:glass", "-o", "few.arrow", "--size", "16x16"]);
     let (code, error) = place.bad(&["study", "s.toml", "-o", "out"]);
     assert!(code == 1 && error.contains("damaged.4.enderton and 7 more runs could"), "{error}");
-    assert_eq!(error.lines().count(), 1, "{error}");
+    // Where it takes long there are signs of life beside it.
+    assert_eq!(error.lines().filter(|l| l.contains("error: ")).count(), 1, "{error}");
     let text = fs::read_to_string(place.path("out/results.jsonl")).unwrap();
     assert_eq!(text.lines().count(), 24);
     assert!(!text.contains("\"damaged\""));

@@ -100,6 +100,8 @@ fn names_are_suggested_whatever_their_case() {
         (&["replay", "t.arrow", "--engine", "FAST"], "did you mean 'fast'?"),
         (&["throughput", "t.arrow", "--designs", "LK"], "did you mean 'lk'?"),
         (&["capture", "builtin:ramps", "-o", "x.arrow", "--order", "API"], "did you mean 'api'?"),
+        (&["Capture", "builtin:ramps", "-o", "x.arrow"], "did you mean 'capture'?"),
+        (&["REPLAY", "t.arrow"], "did you mean 'replay'?"),
         (&["reproduce", "--part", "LK"], "did you mean 'lk'?"),
     ];
     for (arguments, says) in cases {
@@ -238,6 +240,8 @@ fn usual_values_suit_what_is_given() {
 fn reproduce_says_how_long_it_takes_and_keeps_out_of_other_folders() {
     let place = Workplace::new();
     let help = place.good(&["reproduce", "--help"]);
+    // However it is wrapped.
+    let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(help.contains("hours") && help.contains("[default: screendoor-results]"), "{help}");
 }
 
