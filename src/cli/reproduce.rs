@@ -36,10 +36,11 @@ pub(super) struct Arguments {
     #[arg(long, default_value_t = 128, value_name = "K", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(2..=10_000))]
     seeds_of_means: u32,
     /// Frame side in pixels
-    #[arg(long, default_value_t = 800, value_name = "PIXELS", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(128..=4096))]
+    #[arg(long, default_value_t = 640, value_name = "PIXELS", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(128..=4096))]
     side: u32,
-    /// Frame side in pixels of the comparison of all designs
-    #[arg(long, default_value_t = 128, value_name = "PIXELS", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(32..=4096))]
+    /// Frame side in pixels of what all scenes are tried for: the comparison of all designs,
+    /// the views of table 1; claims about variants have half of it
+    #[arg(long, default_value_t = 96, value_name = "PIXELS", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(32..=4096))]
     comparison_side: u32,
     /// Measure only this part; the others stay in RESULTS.md as they are
     #[arg(long, value_name = "PART", value_parser = part)]
