@@ -7,7 +7,7 @@ use clap::Args;
 use crate::cli::console::{Console, grouped, shown};
 use crate::cli::files::{JsonArgument, check, open_trace, report};
 use crate::error::Result;
-use crate::trace::{Header, Statistics, Trace, statistics};
+use crate::trace::{Checksums, Header, Statistics, Trace, statistics};
 
 /// Show what a user wants to know first about a trace
 #[derive(Debug, Args)]
@@ -23,6 +23,9 @@ struct Document<'a> {
     trace: String,
     header: &'a Header,
     content: Option<&'a str>,
+    checksums: Checksums,
+    converted_columns: Vec<(&'static str, String, String)>,
+    extra_columns: &'a [(String, String)],
     row_bytes: usize,
     batches: usize,
     statistics: &'a Statistics,
@@ -44,6 +47,12 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         trace: trace.place().to_string(),
         header: trace.header(),
         content: trace.content(),
+        checksums: trace.checksums(),
+        converted_columns: trace
+            .converted_columns()
+            .map(|(name, stored, read)| (name, stored, read.to_string()))
+            .collect(),
+        extra_columns: trace.extra_columns(),
         row_bytes: trace.header().row_bytes(),
         batches: trace.batch_count(),
         statistics: &stats,

@@ -96,10 +96,10 @@ def replay(path, samples, seed):
             if reference(n, number, surface, seed, samples) < threshold:
                 pixel["samples"][s] = (at[s], colour)
         pixel["held"] = held | mask
-    return state, background
+    return state
 
 
-def resolve(state, background):
+def resolve(state):
     colours = state["samples"]["colour"]
     samples = colours.shape[2]
     total = np.zeros(colours.shape[:2] + (3,), np.float32)
@@ -109,13 +109,14 @@ def resolve(state, background):
             total += colours[:, :, s]
             shares += colours[:, :, s] / np.float32(samples)
     mean = np.where(np.isfinite(total), total / np.float32(samples), shares)
-    untouched = (colours == background).all(axis=(2, 3))
-    return np.where(untouched[..., None], background, mean).astype("<f4")
+    bits = np.ascontiguousarray(colours).view(np.uint32)
+    same = (bits == bits[:, :, :1]).all(axis=(2, 3))
+    return np.where(same[..., None], colours[:, :, 0], mean).astype("<f4")
 
 
 def main(path, samples, seed, output):
-    state, background = replay(path, int(samples), int(seed))
-    picture = resolve(state, background)
+    state = replay(path, int(samples), int(seed))
+    picture = resolve(state)
     with open(output, "wb") as file:
         for row, colours in zip(state, picture):
             for pixel, colour in zip(row, colours):
