@@ -14,7 +14,7 @@ use crate::error::Result;
 use crate::metrics::{Ensemble, EnsembleErrors, PixelClasses, Region};
 use crate::param::Values;
 use crate::picture::{Picture, PictureFile};
-use crate::rop::{EventCounts, Promises, ReplayOptions, Replayed, StateBits};
+use crate::rop::{EventCounts, Layout, Promises, ReplayOptions, Replayed, StateBits};
 use crate::study::engine::{EngineName, OnGpu};
 use crate::trace::Trace;
 
@@ -68,6 +68,8 @@ struct Document<'a> {
     fragments_per_second: f64,
     passes: u32,
     state_bits: StateBits,
+    /// How these are made up.
+    layout: &'a Layout,
     touched_tiles: usize,
     /// Drawn, over all passes.
     fragments: u64,
@@ -156,6 +158,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         fragments_per_second: fragments as f64 / seconds,
         passes: first.passes,
         state_bits: first.state_bits,
+        layout: &first.layout,
         touched_tiles: first.touched_tiles,
         events: first.events.as_ref(),
         errors,
@@ -275,6 +278,7 @@ fn print_events(replayed: &Replayed, design: &Configured, console: &Console) -> 
         format!("{} bits: {} of samples, {} beside", bits.total(), bits.samples, bits.extra)
     };
     console.print(format_args!("state per pixel         {size}"))?;
+    console.print(format_args!("  made up of            {}", replayed.layout))?;
     console.print(format_args!("passes over the trace   {}", replayed.passes))?;
     let promises = design.promises();
     console.print(format_args!("promises                {}", promises.words().join(", ")))

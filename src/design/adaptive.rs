@@ -185,11 +185,21 @@ mod tests {
     use super::*;
     use crate::design::configure;
     use crate::rop::NoProbe;
+    use crate::tile::TileGrid;
     use crate::trace::{SampleMask, Unorm32};
 
     #[test]
     fn the_least_area_goes_and_the_node_before_takes_its_step() {
         let design = configure("adaptive", &[]).unwrap();
+        let frame = Frame {
+            grid: TileGrid::new(1, 1),
+            positions: [[0, 0]].into(),
+            background: [0.0; 3],
+            seed: 0,
+            colour_bits: 96,
+            opaque: true,
+            primitive_depths: None,
+        };
         let design = AdaptiveAt::<1> { columns: Columns::of(design.values(), &frame), nodes: 3 };
         let node = |depth, transmittance| Layer {
             depth: Unorm32(depth),

@@ -20,6 +20,7 @@ files![
     "bin",
     "bindings",
     "capture",
+    "colour",
     "dither",
     "enderton",
     "fragment",

@@ -62,6 +62,8 @@ pub struct Record {
     pub events: EventCounts,
     /// State per pixel.
     pub state_bits: StateBits,
+    /// How it is made up: `8 × (32 depth + 48 colour) + 40 tracking`.
+    pub layout: String,
     /// Passes over the trace.
     pub passes: u32,
     /// Tiles that at least one fragment touched.

@@ -161,7 +161,7 @@ mod tests {
 
     #[test]
     fn groups_of_tiles_add_up() {
-        let list: Vec<_> = (0..40).flat_map(|x| [(x, 3, 5, 0), (x, 3, 5 + u32::from(x % 2), 0)]);
+        let list = (0..40).flat_map(|x| [(x, 3, 5, 0), (x, 3, 5 + u32::from(x % 2), 0)]);
         let list: Vec<_> = list.collect();
         for at_a_time in [1, 33, 1000] {
             assert_eq!(of(&list, 2, at_a_time), 40, "{at_a_time}");

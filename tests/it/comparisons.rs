@@ -24,7 +24,7 @@ fn fragment(depth: u32, coverage: u64, alpha: f32) -> Fragment {
     }
 }
 
-/// Fragments of one pixel of 4 samples: depths, and whether they cover all or two of them.
+/// A trace of one pixel of 4 samples.
 fn pixel(fragments: &[Fragment]) -> Trace {
     trace(&header(1, 1, 4), fragments)
 }
@@ -66,7 +66,7 @@ fn layers_are_compared_as_often_as_by_hand() {
         ("adaptive:layers=2", INSERTED + 5 * 2),
         // Among 0, 1, 2, 3, 3 nodes; twice the lesser of two areas; 3 nodes for each.
         ("adaptive:layers=3", 1 + 2 + 3 + 3 + 2 + 5 * 3),
-        // Among 0 to 4; the least of 4 areas of 6 nodes is never asked for.
+        // Among 0 to 4, and there is room for all.
         ("adaptive:layers=5", 10 + 5 * 5),
         // Sorted at the end: 2, 3 and 5 layers by 1, 3 and 9 comparators.
         ("abuffer:layers=2", 1),

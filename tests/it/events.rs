@@ -1,7 +1,7 @@
 //! What the ROPs are said to have done, against counts made by hand.
 
 use screendoor::rop::{EventCounts, Frame, ReplayOptions, Site, StateBits};
-use screendoor::trace::{DepthPlane, Fragment, SampleMask, Trace, Unorm32};
+use screendoor::trace::{ColourFormat, DepthPlane, Fragment, Header, SampleMask, Trace, Unorm32};
 
 use crate::util::{all_variants, design, header, random_fragments, trace};
 
@@ -25,7 +25,7 @@ fn three_fragments() -> Trace {
         // All; only sample 0, at 100, lies behind it.
         fragment(2, 0b1111, 70),
     ];
-    trace(&header(1, 1, 4), &fragments)
+    trace(&Header { colour: ColourFormat::F16, ..header(1, 1, 4) }, &fragments)
 }
 
 fn events(spec: &str) -> EventCounts {
@@ -94,15 +94,15 @@ fn three_fragments_cost_what_they_cost() {
     let kept = 3 * (4 + 96 + 48 + 32);
     assert_eq!(events("exact"), counts([0, 0, 9], 0, [0; 3], 0, [0, kept]));
 
-    // Without a z-buffer, all 9 samples are blended or summed: a colour is 96 bits;
-    // colour, weight and transmittance are 160.
+    // Without a z-buffer, all 9 samples are blended or summed: a colour is 48 bits;
+    // colour, weight and transmittance are 80.
     let all = |bits: u64| counts([0, 0, 9], 0, [0; 3], 0, [bits, bits]);
-    assert_eq!(events("blend:opaque=together"), all(9 * 96));
-    assert_eq!(events("sorted-blend:opaque=together"), all(9 * 96));
-    assert_eq!(events("wboit:opaque=together"), all(9 * 160));
-    assert_eq!(events("wboit:opaque=together,coverage=share"), all(3 * 160));
-    // 5 moments in the first pass; they and 128 bits of colour and weight in the second.
-    let state = [9 * 160 + 9 * 288, 9 * 160 + 9 * 128];
+    assert_eq!(events("blend:opaque=together"), all(9 * 48));
+    assert_eq!(events("sorted-blend:opaque=together"), all(9 * 48));
+    assert_eq!(events("wboit:opaque=together"), all(9 * 80));
+    assert_eq!(events("wboit:opaque=together,coverage=share"), all(3 * 80));
+    // 5 moments in the first pass; they and 64 bits of colour and weight in the second.
+    let state = [9 * 160 + 9 * 224, 9 * 160 + 9 * 64];
     let twice = EventCounts { fragments: 6, ..counts([0, 0, 18], 0, [0; 3], 0, state) };
     assert_eq!(events("mboit:opaque=together"), twice);
     // With one, opaque fragments meet that and nothing else.
@@ -125,30 +125,34 @@ fn state_per_pixel() {
         ("enderton", 320, 0),
         ("enderton:depth-bits=16", 256, 0),
         // Layers of a depth, a mask, a colour and an alpha beside the opaque samples.
-        ("kbuffer", 320, 8 * (32 + 4 + 48 + 32)),
-        ("kbuffer:coverage=share,opaque=together,layers=2", 0, 2 * (32 + 48 + 32)),
-        ("mlab", 320, 8 * 116),
-        ("abuffer", 320, 8 * 116 + 4),
-        ("abuffer:overflow=blend", 320, 8 * 116 + 4 + 4 * 80),
+        ("kbuffer", 320, 8 * (32 + 4 + 48 + 16)),
+        ("kbuffer:coverage=share,opaque=together,layers=2", 0, 2 * (32 + 48 + 16)),
+        ("mlab", 320, 8 * 100),
+        ("abuffer", 320, 8 * 100 + 4),
+        ("abuffer:overflow=blend", 320, 8 * 100 + 4 + 4 * 64),
         // Three sums of colour, one of alpha, a count.
-        ("hybrid", 320, 8 * 116 + 5 * 32),
+        ("hybrid", 320, 8 * 100 + 5 * 16),
         // Nodes have no colour; its sum has three parts.
-        ("adaptive", 320, 8 * (32 + 4 + 32) + 3 * 32),
+        ("adaptive", 320, 8 * (32 + 4 + 32) + 3 * 16),
         // Two depths, colours and alphas a sample, and where asked numbers.
-        ("depth-peeling", 320, 4 * 2 * (32 + 48 + 32)),
-        ("depth-peeling:ties=kept", 320, 4 * 2 * (64 + 48 + 32) + 32),
-        ("slab:normalise=none", 320, 8 * 116),
+        ("depth-peeling", 320, 4 * 2 * (32 + 48 + 16)),
+        ("depth-peeling:ties=kept", 320, 4 * 2 * (64 + 48 + 16) + 32),
+        ("slab:normalise=none", 320, 8 * 100),
         ("slab:normalise=none,opacity=discrete", 320, 8 * (32 + 4 + 48 + 16)),
         // A transmittance a sample, a colour, an alpha.
-        ("slab", 320, 8 * 116 + 4 * 32 + 3 * 32 + 32),
-        // The opaque buffer's colours widened from 48 to 96 bits; without it, colours alone.
-        ("blend", 320 + 4 * 48, 0),
-        ("sorted-blend", 320 + 4 * 48, 0),
-        ("blend:opaque=together", 4 * 96, 0),
-        ("wboit", 320, 4 * 160),
-        ("wboit:coverage=share", 320, 160),
-        ("mboit", 320, 4 * (5 * 32 + 128)),
-        ("mboit:moments=8,coverage=share,opaque=together", 0, 9 * 32 + 128),
+        ("slab", 320, 8 * 100 + 4 * 16 + 3 * 16 + 16),
+        // Into the opaque buffer's own colours; without it, colours alone.
+        ("blend", 320, 0),
+        ("sorted-blend", 320, 0),
+        ("blend:opaque=together", 4 * 48, 0),
+        ("wboit", 320, 4 * 80),
+        ("wboit:coverage=share", 320, 80),
+        ("mboit", 320, 4 * (5 * 32 + 64)),
+        ("mboit:moments=8,coverage=share,opaque=together", 0, 9 * 32 + 64),
+        // All colours, and what stands beside them, at another width.
+        ("lk:colour=8", 4 * (32 + 24), 36),
+        ("kbuffer:colour=32", 4 * (32 + 96), 8 * (32 + 4 + 96 + 32)),
+        ("enderton:method=depth-correction,colour=8", 4 * (32 + 24) + 4 * 32, 4 * 8 + 24 + 8),
     ] {
         let expected = StateBits { samples, extra, unbounded: false };
         assert_eq!(design(spec).state_bits(&frame).unwrap(), expected, "{spec}");

@@ -74,7 +74,7 @@ fn assert_same(found: &Found, expected: &Found, label: &str) {
 }
 
 /// Holds a variant of a design against its plain text.
-fn check(gpu: &Gpu, design: &Configured, samples: u32, seed: u32, threads: Threads) {
+pub fn check(gpu: &Gpu, design: &Configured, samples: u32, seed: u32, threads: Threads) {
     let header = Header { background: [0.1, 0.2, 0.3], ..header(40, 40, samples) };
     let mut fragments = crowd(&header, 60, seed);
     fragments.extend(random_fragments(&header, 300, seed));

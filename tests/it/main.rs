@@ -3,6 +3,7 @@
 mod blended;
 mod browser;
 mod cli;
+mod colour;
 mod comparisons;
 mod conformance;
 mod events;

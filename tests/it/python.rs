@@ -108,6 +108,7 @@ fn record(design: &str, rmse: f64) -> Record {
             "state_bits_read": 10, "state_bits_written": 11,
         },
         "state_bits": {"samples": 512, "extra": 42, "unbounded": false}, "passes": 1,
+        "layout": "8 × (32 depth + 32 colour) + 42 made up",
         "touched_tiles": 12, "picture": "0", "speed": {"fast": {
             "seconds": {"low": 0.1, "median": 0.2, "high": 0.3}, "kernel": null,
             "same_bits": true, "missing": null,

@@ -1,7 +1,7 @@
 // Figure 7 of src/rop/tracked.rs with a thread for each sample: those of a pixel do the same
 // but for what is their own sample's. `place_in_lanes` is the file's that uses this one:
 // threads look at each other's depths there.
-// uses: replay tracked
+// uses: colour replay tracked
 
 const PIXELS: u32 = GROUP / SAMPLES;
 
@@ -19,7 +19,7 @@ fn lane_load() {
 fn lane_store() {
     if lane_winner != NO_ROW {
         state_put(AT_DEPTH + lane, lane_depth);
-        state_put_colour(AT_COLOUR + 3u * lane, colour(lane_winner));
+        state_put_colour(AT_COLOUR + 3u * lane, stored3(colour(lane_winner)));
     }
     if lane == 0u {
         sampler_store();

@@ -1,6 +1,6 @@
 // Twin of src/rop/layers.rs: layers of a pixel in the order of their depths. `LAYER_ROOM` is
 // the most that are ever held.
-// uses: arithmetic fragment state
+// uses: arithmetic colour fragment state
 
 struct Layer {
     depth: u32,
@@ -60,7 +60,14 @@ fn place_in_columns(f: Fragment) -> Placed {
 // Columns::layer.
 fn layer_of(f: Fragment) -> Layer {
     let placed = place_in_columns(f);
-    return Layer(f.z, placed.coverage, rounded3(f.colour * placed.alpha), 1.0 - placed.alpha);
+    let colour = rounded3(f.colour * placed.alpha);
+    return stored_layer(Layer(f.z, placed.coverage, colour, 1.0 - placed.alpha));
+}
+
+// Columns::stored.
+fn stored_layer(layer: Layer) -> Layer {
+    let through = stored(layer.transmittance);
+    return Layer(layer.depth, layer.coverage, stored3(layer.colour), through);
 }
 
 // Layer::merged.

@@ -4,6 +4,7 @@
 
 fn inner_draw(number: u32, f: Fragment, row: u32) {
     if insert_layer(nearer(f.z), layer_of(f), LAYER_ROOM) {
-        layers[LAYER_ROOM - 1u] = merged(layers[LAYER_ROOM - 1u], evicted);
+        layers[LAYER_ROOM - 1u] =
+            stored_layer(merged(layers[LAYER_ROOM - 1u], evicted));
     }
 }

@@ -1,6 +1,6 @@
 // Twin of src/rop/over_opaque.rs: opaque geometry first, transparent geometry over it.
 // `inner_clear`, `inner_load`, `inner_store`, `inner_draw` and `inner_end_pass` are the design's.
-// uses: fragment state
+// uses: colour fragment state
 
 var<private> opaque_depth: array<u32, SAMPLES>;
 var<private> opaque_winner: array<u32, SAMPLES>;
@@ -39,7 +39,7 @@ fn store_pixel() {
         for (var s = 0u; s < SAMPLES; s++) {
             if opaque_winner[s] != NO_OPAQUE_ROW {
                 state_put(AT_OPAQUE_DEPTH + s, opaque_depth[s]);
-                state_put_colour(AT_OPAQUE_COLOUR + 3u * s, colour(opaque_winner[s]));
+                state_put_colour(AT_OPAQUE_COLOUR + 3u * s, stored3(colour(opaque_winner[s])));
             }
         }
         return;

@@ -1,7 +1,7 @@
 // Twin of src/rop/samples.rs: the multisample buffer of one pixel, and the order of samples.
 // Colours wait until the pixel's fragments have all been drawn: until then it is known
 // which row won each sample.
-// uses: bindings fragment state
+// uses: bindings colour fragment state
 
 const NO_ROW: u32 = 0xffffffffu;
 const FAR: u32 = 0xffffffffu;
@@ -27,7 +27,7 @@ fn samples_store() {
     for (var s = 0u; s < SAMPLES; s++) {
         if winner[s] != NO_ROW {
             state_put(AT_DEPTH + s, depth[s]);
-            state_put_colour(AT_COLOUR + 3u * s, colour(winner[s]));
+            state_put_colour(AT_COLOUR + 3u * s, stored3(colour(winner[s])));
         }
     }
 }

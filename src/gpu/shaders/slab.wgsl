@@ -173,7 +173,7 @@ fn enter(f: Fragment) {
         if !is_seen(place, placed.coverage, bits) {
             return;
         }
-        put_layer(place, Layer(f.z, placed.coverage, f.colour, 0.0), bits);
+        put_layer(place, Layer(f.z, placed.coverage, stored3(f.colour), 0.0), bits);
         if HIDDEN_REMOVED {
             remove_hidden();
         }
@@ -194,6 +194,7 @@ fn enter(f: Fragment) {
                 let alpha = placed.alpha / p;
                 layer.colour = f.colour * alpha;
                 layer.transmittance = 1.0 - alpha;
+                layer = stored_layer(layer);
             }
         }
         put_layer(place, layer, WIDE_NONE);
@@ -230,11 +231,11 @@ fn inner_draw(number: u32, f: Fragment, row: u32) {
                 visible += through(before, s);
             }
             if BY_ALPHA {
-                column_passes[s] *= 1.0 - placed.alpha;
+                column_passes[s] = stored(column_passes[s] * (1.0 - placed.alpha));
             }
         }
     }
     let weight = visible * placed.alpha;
-    sum_colour += rounded3(weight * f.colour);
-    sum_alpha += weight;
+    sum_colour = stored3(sum_colour + rounded3(weight * f.colour));
+    sum_alpha = stored(sum_alpha + weight);
 }

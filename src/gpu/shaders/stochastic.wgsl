@@ -1,6 +1,6 @@
 // Twin of src/rop/stochastic.rs: what is made of the chosen samples. `sampler_clear`,
 // `sampler_load`, `sampler_store` and `choose` are the sampler's.
-// uses: arithmetic round samples
+// uses: arithmetic colour round samples
 
 const SUMS: bool = !METHOD_BASIC || ROUNDS_LOG2 > 0u;
 const ROUNDS: u32 = 1u << ROUNDS_LOG2;
@@ -78,8 +78,8 @@ fn inner_store() {
 }
 
 fn sums_add(colour: vec3<f32>, weight: f32) {
-    sum_colour += rounded3(colour * weight);
-    sum_weight += weight;
+    sum_colour = stored3(sum_colour + rounded3(colour * weight));
+    sum_weight = stored(sum_weight + weight);
 }
 
 fn inner_draw(number: u32, f: Fragment, row: u32) {
@@ -87,7 +87,7 @@ fn inner_draw(number: u32, f: Fragment, row: u32) {
     if CORRECTED && pass_kind.kind == PASS_TOTAL_ALPHA {
         for (var s = 0u; s < SAMPLES; s++) {
             if mask_contains(f.coverage, s) {
-                transmittance[s] *= 1.0 - f.alpha;
+                transmittance[s] = stored(transmittance[s] * (1.0 - f.alpha));
             }
         }
         return;

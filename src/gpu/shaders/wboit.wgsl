@@ -1,6 +1,6 @@
 // Twin of src/design/wboit.rs: the fragments' mean, weighted by depth and alpha, in single
 // precision.
-// uses: arithmetic fragment over_opaque replay state view_depth
+// uses: arithmetic colour fragment over_opaque replay state view_depth
 
 const COUNT: u32 = select(1u, SAMPLES, COVERAGE_SAMPLE);
 
@@ -61,9 +61,11 @@ fn inner_draw(number: u32, f: Fragment, row: u32) {
     for (var s = 0u; s < COUNT; s++) {
         if mask_contains(touched, s) {
             let colour = state_colour(AT_SUM_COLOUR + 3u * s);
-            state_put_colour(AT_SUM_COLOUR + 3u * s, colour + rounded3(weighted * f.colour));
-            state_put_real(AT_SUM_WEIGHT + s, state_real(AT_SUM_WEIGHT + s) + weighted);
-            state_put_real(AT_SUM_THROUGH + s, state_real(AT_SUM_THROUGH + s) * (1.0 - alpha));
+            let sum = stored3(colour + rounded3(weighted * f.colour));
+            let through = stored(state_real(AT_SUM_THROUGH + s) * (1.0 - alpha));
+            state_put_colour(AT_SUM_COLOUR + 3u * s, sum);
+            state_put_real(AT_SUM_WEIGHT + s, stored(state_real(AT_SUM_WEIGHT + s) + weighted));
+            state_put_real(AT_SUM_THROUGH + s, through);
         }
     }
 }

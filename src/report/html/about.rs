@@ -8,6 +8,7 @@ use crate::report::html::parts::{Cell, Content, command, figure, rounded, table}
 use crate::report::html::words::{figures, fixed, grouped, quoted};
 use crate::rop::Promise;
 use crate::study::analysis::{Cost, ROUNDING, baseline};
+use crate::study::record::Record;
 
 pub(super) fn designs(content: &Content<'_>) -> Markup {
     html! {
@@ -22,6 +23,7 @@ pub(super) fn designs(content: &Content<'_>) -> Markup {
                         @if !text.citation.is_empty() { p class="citation" { (text.citation) } }
                     }
                     p class="promises" { (promises(text.map(|t| &t.promises[..]), record)) }
+                    @if let Some(needs) = needs(content, series) { p class="promises" { (needs) } }
                 }
             }
         }
@@ -34,8 +36,33 @@ fn anchor(series: &str) -> String {
     series.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect()
 }
 
+/// What a pixel and a picture take at the sample count at which designs are compared: of
+/// scenes with opaque fragments, for which some keep a z-buffer, apart where that differs.
+fn needs(content: &Content<'_>, series: &str) -> Option<String> {
+    let own = || {
+        let all = content.results.records.iter();
+        all.filter(move |r| r.series == series && r.samples == content.count)
+    };
+    let words = |r: &Record| {
+        let passes = if r.passes == 1 { "pass" } else { "passes" };
+        let bytes = match r.state_bytes() {
+            Some(bytes) => format!("{} B", figures(bytes)),
+            None => "grows".to_string(),
+        };
+        format!("{bytes}, {} {passes}", r.passes)
+    };
+    let cost = |r: &&Record| (r.passes, r.state_bits.total());
+    let (least, most) = (own().min_by_key(cost)?, own().max_by_key(cost)?);
+    let more = if cost(&least) == cost(&most) {
+        String::new()
+    } else {
+        format!("; {} with opaque fragments", words(most))
+    };
+    Some(format!("{}{more}, at {} samples: {}", words(least), content.count, most.layout))
+}
+
 /// What a design promises: as it is told, or as its records have it.
-fn promises(told: Option<&[String]>, record: Option<&crate::study::record::Record>) -> String {
+fn promises(told: Option<&[String]>, record: Option<&Record>) -> String {
     let mut words: Vec<String> =
         record.iter().filter(|r| !r.family.is_empty()).map(|r| r.family.clone()).collect();
     match (told, record) {

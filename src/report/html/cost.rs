@@ -148,7 +148,8 @@ fn state(content: &Content<'_>) -> Markup {
     let beside = format!("of these beside the samples, at {}", content.count);
     let mut header = vec!["design"];
     header.extend(heads.iter().map(String::as_str));
-    header.extend([beside.as_str(), "passes"]);
+    let made_up = format!("bits at {}, made up of", content.count);
+    header.extend([beside.as_str(), "passes", made_up.as_str()]);
     let row = |series: &String| {
         let own = |n: u32| {
             content.results.records.iter().filter(move |r| r.series == *series && r.samples == n)
@@ -158,16 +159,30 @@ fn state(content: &Content<'_>) -> Markup {
             cells.push(match own(*n).max_by_key(|r| r.state_bits.total()) {
                 None => Cell::Missing("no result".into()),
                 Some(_) if own(*n).any(|r| r.state_bits.unbounded) => Cell::text("grows"),
-                Some(r) => whole(r.state_bits.total()),
+                Some(r) => between(own(*n).map(|r| r.state_bits.total()), r.state_bits.total()),
             });
         }
         let extra = own(content.count).map(|r| r.state_bits.extra).max();
         cells.push(extra.map_or(Cell::Missing("no result".into()), whole));
-        let passes = own(content.count).map(|r| r.passes).max();
-        cells.push(passes.map_or(Cell::Missing("no result".into()), whole));
+        let passes = || own(content.count).map(|r| r.passes);
+        let most = passes().max();
+        cells.push(most.map_or(Cell::Missing("no result".into()), |n| between(passes(), n)));
+        let largest = own(content.count).max_by_key(|r| r.state_bits.total());
+        cells.push(largest.map_or(Cell::Missing("no result".into()), |r| Cell::text(&r.layout)));
         cells
     };
     table(&header, &content.designs().iter().map(row).collect::<Vec<_>>())
+}
+
+/// What differs between scenes, from the least to `most`: opaque fragments take more.
+fn between(values: impl Iterator<Item = u32>, most: u32) -> Cell {
+    match values.min() {
+        Some(least) if least < most => {
+            let [a, b] = [least, most].map(|n| grouped(u64::from(n)));
+            Cell::Number(f64::from(most), format!("{a} to {b}"))
+        }
+        _ => whole(most),
+    }
 }
 
 fn whole(n: u32) -> Cell {

@@ -25,7 +25,7 @@ pub(in crate::report::results) fn variant(
         mean: Estimate { value: mean, low: mean - 0.1, high: mean + 0.1 },
         max: rmse,
         variance: Some(rmse * rmse - mean * mean),
-        bias_squared: Some(mean * mean),
+        bias_squared: Some(known(mean * mean)),
         temporal: None,
     };
     Variant { design: design.to_string(), errors, blocks: known(blocks) }

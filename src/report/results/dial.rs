@@ -18,7 +18,7 @@ fn split(scene: &TriedScene, design: &str) -> Option<[f64; 2]> {
     let e = &scene.variant(design)?.errors;
     // A design without seeds has its whole error as bias.
     let variance = e.variance.unwrap_or(0.0);
-    let bias = e.bias_squared.unwrap_or(e.rmse.value * e.rmse.value);
+    let bias = e.bias_squared.map_or(e.rmse.value * e.rmse.value, |b| b.value);
     Some([variance, bias].map(|square| square.max(0.0).sqrt()))
 }
 
@@ -159,7 +159,7 @@ mod tests {
         let made = |design: &str, noise: f64, bias: f64| {
             let mut v = variant(design, noise.hypot(bias), 1.0, 0.0);
             v.errors.variance = Some(noise * noise);
-            v.errors.bias_squared = Some(bias * bias);
+            v.errors.bias_squared = Some(Estimate::of(&[bias * bias]));
             v
         };
         let dial = DIAL.iter().enumerate().map(|(i, bits)| {

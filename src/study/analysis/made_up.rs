@@ -148,6 +148,7 @@ pub(crate) fn record(scene: &str, series: &str, samples: u32, rmse: Estimate) ->
         spectrum: None,
         events: EventCounts { fragments: 1_000_000, ..EventCounts::default() },
         state_bits: StateBits { samples: 64 * samples, extra: 16, unbounded: false },
+        layout: format!("{samples} × (32 depth + 32 colour) + 16 made up"),
         passes: 1,
         touched_tiles: 800,
         picture: "0".into(),

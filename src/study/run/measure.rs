@@ -71,6 +71,7 @@ pub(super) fn measure(
         spectrum: seen.spectrum,
         events: counted.events,
         state_bits: counted.state_bits,
+        layout: counted.layout,
         passes: counted.passes,
         touched_tiles: counted.touched_tiles as u64,
         speed: run.speed(engines, &picture),
@@ -97,6 +98,7 @@ struct Run<'a> {
 struct Counted {
     events: EventCounts,
     state_bits: StateBits,
+    layout: String,
     passes: u32,
     touched_tiles: usize,
 }
@@ -107,6 +109,7 @@ impl Counted {
         Some(Counted {
             events: replayed.events.clone()?,
             state_bits: replayed.state_bits,
+            layout: replayed.layout.to_string(),
             passes: replayed.passes,
             touched_tiles: replayed.touched_tiles,
         })
