@@ -148,6 +148,7 @@ pub(super) fn text(text: &mut String, trial: &Trial) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::metrics::Estimate;
     use crate::report::results::claims::tests::variant;
 
     /// A scene with noise and bias along the dial, its ends as given.
