@@ -94,12 +94,8 @@ impl Error {
     /// nearest one, whatever the case of its letters, or all of them where none is near.
     pub fn unknown<'a>(kind: &str, name: &str, known: impl IntoIterator<Item = &'a str>) -> Self {
         let known: Vec<&str> = known.into_iter().collect();
-        let nearest = known
-            .iter()
-            .map(|k| (strsim::jaro_winkler(&name.to_lowercase(), &k.to_lowercase()), *k))
-            .max_by(|a, b| a.0.total_cmp(&b.0));
-        let hint = match nearest {
-            Some((score, k)) if score > 0.75 => format!("did you mean '{k}'?"),
+        let hint = match nearest(name, known.iter().copied()) {
+            Some(k) => format!("did you mean '{k}'?"),
             _ if known.is_empty() => "there are none".to_string(),
             _ => format!("known: {}", known.join(", ")),
         };
@@ -110,6 +106,15 @@ impl Error {
     pub fn is_config(&self) -> bool {
         matches!(self, Error::Config { .. })
     }
+}
+
+/// The name among `known` that is nearest to `name`, whatever the case of its letters, where
+/// one is near.
+pub(crate) fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let name = name.to_lowercase();
+    let scored = known.into_iter().map(|k| (strsim::jaro_winkler(&name, &k.to_lowercase()), k));
+    let (score, known) = scored.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (score > 0.75).then_some(known)
 }
 
 /// What libraries and files say, fit for one line: each run of line breaks, tabs and other

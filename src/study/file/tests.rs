@@ -1,0 +1,104 @@
+//! What study files may say, and what is said of those that do not.
+
+use super::*;
+
+const SMALL: &str = "name = 'a'\ndesigns = ['lk', 'kbuffer:layers={n}']\nsamples = [4, 8]\n\
+    [[scene]]\nname = 'engine'\nsource = 'builtin:engine'\n";
+
+fn message(from: &str, to: &str) -> String {
+    let text = SMALL.replace(from, to);
+    assert_ne!(text, SMALL);
+    Study::parse(&text, "a.toml").unwrap_err().to_string()
+}
+
+#[test]
+fn what_is_left_out_has_its_default_and_is_written() {
+    let study = Study::parse(SMALL, "a.toml").unwrap();
+    assert_eq!((study.seeds, study.baseline.as_str()), (8, "lk"));
+    assert_eq!(study.design("kbuffer:layers={n}", 8).unwrap().values().integer("layers"), 8);
+    let text = study.to_toml();
+    assert!(text.contains("seeds = 8"), "{text}");
+    assert_eq!(Study::parse(&text, "b.toml").unwrap(), study);
+}
+
+#[test]
+fn what_is_left_out_never_contradicts_what_is_given() {
+    // Without the design that takes no count.
+    let any = SMALL.replace(", 'kbuffer:layers={n}'", "");
+    for count in [1, 2, 4, 8, 16, 32, 64] {
+        let text = any.replace("[4, 8]", &format!("[{count}]"));
+        assert_eq!(Study::parse(&text, "a.toml").unwrap().pictures, [count]);
+    }
+    for (samples, pictures) in [("[4, 16]", 4), ("[64, 2]", 2), ("[4, 8, 16]", 8)] {
+        let text = any.replace("[4, 8]", samples);
+        assert_eq!(Study::parse(&text, "a.toml").unwrap().pictures, [pictures]);
+    }
+    let none = SMALL.replace("samples =", "pictures = []\nsamples =");
+    assert!(Study::parse(&none, "a.toml").unwrap().pictures.is_empty());
+    let standard = SMALL.replace("[4, 8]", "[8]") + "pattern = 'standard'\n";
+    assert_eq!(Study::parse(&standard, "a.toml").unwrap().scenes[0].captured_samples, 8);
+}
+
+#[test]
+fn the_default_study_is_one() {
+    let study = Study::preset().unwrap();
+    assert_eq!(study.baseline, "enderton");
+    assert!(study.scenes.iter().all(|s| s.source.as_deref().unwrap().starts_with("builtin:")));
+}
+
+#[test]
+fn publications_are_measured_once() {
+    let of = |list: &str| {
+        let text = SMALL.replace("[[scene]]", &format!("publications = [{list}]\n[[scene]]"));
+        Study::parse(&text, "a.toml").unwrap().publications_to_measure()
+    };
+    assert_eq!(of("'slab', 'lk', 'slab'"), [Publication::LaineKarras, Publication::Slab]);
+    assert_eq!(of("'slab', 'comparison'"), [Publication::Comparison]);
+}
+
+#[test]
+fn a_wrong_key_or_name_says_where_and_the_nearest() {
+    assert_eq!(
+        message("samples =", "sampels ="),
+        "unknown key in a.toml, line 3: 'sampels'; did you mean 'samples'?"
+    );
+    assert_eq!(
+        message("source =", "sorce ="),
+        "unknown key in a.toml, line 6: 'sorce'; did you mean 'source'?"
+    );
+    assert_eq!(
+        message("name = 'a'", "name = 'a'\nmetrics = ['flop']"),
+        "unknown name in a.toml, line 2: 'flop'; did you mean 'flip'?"
+    );
+    assert!(message("samples =", "Samples =").ends_with("did you mean 'samples'?"));
+    assert!(message("'lk'", "'LK'").contains("did you mean 'lk'?"));
+    assert_eq!(
+        message("name = 'a'", "name = 'a'\nengines = ['gpo']"),
+        "unknown name in a.toml, line 2: 'gpo'; did you mean 'gpu'?"
+    );
+    let wrong = message("'lk'", "'endertn'");
+    assert!(wrong.contains("unknown design 'endertn'; did you mean 'enderton'?"), "{wrong}");
+    let wrong = message("layers={n}", "layer={n}");
+    assert!(wrong.contains("did you mean 'layers'?"), "{wrong}");
+}
+
+#[test]
+fn what_cannot_be_is_refused() {
+    for (from, to, says) in [
+        ("[4, 8]", "[4, 5]", "'samples' cannot be 5"),
+        ("[4, 8]", "[4, 4]", "'4' is named twice"),
+        ("name = 'a'", "name = 'a'\npictures = [16]", "pictures are kept of 16 samples"),
+        ("[4, 8]", "[]", "'samples' is empty"),
+        ("'engine'", "'a/b'", "is no name for a scene"),
+        ("'engine'", "'..'", "is no name for a scene"),
+        ("name = 'engine'", "name = 'engine'\npixel = [3, 512]", "'pixel' cannot be 3, 512"),
+        ("name = 'engine'", "name = 'engine'\ncaptured_samples = 8", "do not serve 4"),
+        ("source = 'builtin:engine'", "", "needs either a source or a trace"),
+        ("name = 'a'", "name = 'a'\nseeds = 0", "'seeds' cannot be 0"),
+        ("name = 'a'", "name = 'a'\nbaseline = 'slab'", "unknown design as a baseline"),
+        ("name = 'a'", "name = 'a", "line 1"),
+    ] {
+        let wrong = message(from, to);
+        assert!(wrong.contains(says), "{wrong}");
+    }
+}
