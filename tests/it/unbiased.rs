@@ -49,7 +49,7 @@ fn cases(samples: u32) -> Vec<Case> {
     // More layers than anyone keeps, of an alpha that 10 bits round down.
     let small = util::header(12, 12, samples);
     let deep = layered(&small, 40, |i| (i * 7 % 40, colour(i), 30.45 / 1023.0));
-    cases.push(("deep", small, deep));
+    cases.push(("deep", small.clone(), deep));
     let mut far_first = near_first.clone();
     far_first.reverse();
     cases.push(("near first", header.clone(), near_first));
