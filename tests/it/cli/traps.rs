@@ -172,10 +172,13 @@ fn every_command_writes_json_with_a_schema_and_typed_parameters() {
         assert!(name.starts_with("screendoor."), "{name}");
         assert!(schema["version"].as_u64().is_some_and(|v| v >= 1), "{name}");
         assert_eq!(parameters(&document) > 0, *tells, "{name}");
-        // To a file it is the same, and figures are not printed beside it.
-        let text = place.good(&[arguments, &["--json", "f.json"][..]].concat());
-        let file: Value = serde_json::from_slice(&fs::read(place.path("f.json")).unwrap()).unwrap();
-        assert_eq!(file["schema"], *schema, "{text}");
+        // To a file it is the same; the demo takes its time, and prints its text beside it.
+        if arguments[0] != "demo" {
+            let text = place.good(&[arguments, &["--json", "f.json"][..]].concat());
+            let file = fs::read(place.path("f.json")).unwrap();
+            let file: Value = serde_json::from_slice(&file).unwrap();
+            assert!(file["schema"] == *schema && text.is_empty(), "{text}");
+        }
         schemas.push(name);
     }
     // Two commands of studies write one document.
