@@ -92,8 +92,11 @@ fn made(header: &Header, count: usize) -> Vec<Fragment> {
     fragments
 }
 
-/// Traces, each with counts, seeds and pixels whose state is looked at.
-fn cases(folder: &Path) -> Vec<(PathBuf, Vec<(u32, u32)>, Vec<(u16, u16)>)> {
+/// A trace with sample counts and seeds, and the pixels whose state is looked at.
+type Case = (PathBuf, Vec<(u32, u32)>, Vec<(u16, u16)>);
+
+/// What the program is held to.
+fn cases(folder: &Path) -> Vec<Case> {
     let stored =
         |name: &str| Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("traces/{name}.arrow"));
     let grid = |step: u16| -> Vec<(u16, u16)> {
