@@ -5,8 +5,11 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::metrics::{EnsembleErrors, Estimate};
-use crate::rop::{EventCounts, Promise, Promises, StateBits};
+use crate::rop::{EventCounts, Promises, StateBits};
 use crate::study::throughput::Spread;
+
+/// Part of a record, for those who read records alone.
+pub use crate::rop::Promise;
 
 /// One design at one sample count on one scene, over all seeds of the study.
 ///

@@ -6,8 +6,8 @@ use crate::param::Options;
 use crate::report::html::page::{Place, given_within};
 use crate::report::html::parts::{Cell, Content, command, figure, rounded, table};
 use crate::report::html::words::{figures, fixed, grouped, quoted};
-use crate::rop::Promise;
 use crate::study::analysis::{Cost, ROUNDING, baseline};
+use crate::study::record::Promise;
 use crate::study::record::Record;
 
 pub(super) fn designs(content: &Content<'_>) -> Markup {

@@ -6,7 +6,7 @@ use std::fmt::Write;
 use crate::param::Options;
 use crate::report::markdown_table;
 use crate::report::stability::{in_cell, short};
-use crate::rop::Promise;
+use crate::study::record::Promise;
 use crate::study::stress::{
     DECIDED, Facts, Finding, Group, HEAVY_SEEDS, Outcome, SIGNIFICANCE, Series, Stability, Tally,
 };

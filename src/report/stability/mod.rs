@@ -72,7 +72,7 @@ fn in_cell(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rop::Promise;
+    use crate::study::record::Promise;
     use crate::study::stress::{Agreement, Claim, Facts, Fault, Finding, Outcome, Series, cases};
 
     #[test]
