@@ -13,11 +13,11 @@ use std::sync::Arc;
 
 use crate::error::Result;
 use crate::param::Values;
-use crate::rop::over_opaque;
 use crate::rop::{
     BlendBuffer, Blueprint, ColourStore, Contents, Family, Frame, Info, Layout, NoProbe, Opaque,
     OpaquePromise, OrderPromise, OverOpaque, PrimitiveDepths, Probe, Promises, Site, Transparent,
 };
+use crate::rop::{colour, over_opaque};
 use crate::trace::{Fragment, SampleMask};
 
 /// The design's entry in the registry.
@@ -29,7 +29,7 @@ impl Blueprint for SortedBlend {
         family: Family::Blended,
         summary: "alpha blending of primitives sorted far to near by the application, each by its mean depth",
         citation: "Newell, Newell, Sancha: A Solution to the Hidden Surface Problem, ACM 1972, without its splitting",
-        params: &[over_opaque::PARAM],
+        params: &[over_opaque::PARAM, colour::PARAM],
         combinations: &[],
     };
 

@@ -183,7 +183,10 @@ const DEFECTS: &[(&str, Threads, Defect)] = &[
     (
         "lk:method=depth-correction",
         Threads::Pixel,
-        ("transmittance[s] *= 1.0 - f.alpha", "transmittance[s] *= 1.0000001 - f.alpha"),
+        (
+            "stored(transmittance[s] * (1.0 - f.alpha))",
+            "stored(transmittance[s] * (1.001 - f.alpha))",
+        ),
     ),
     (
         "lk:method=depth-correction",

@@ -106,14 +106,15 @@ mod tests {
         ColourFormat, Fragment, Header, SamplePattern, TraceWriter, Unorm32, WriteOptions,
     };
 
-    /// The tied fragments of a list of (pixel, coverage, depth, slope along x).
+    /// The tied fragments of a list of (pixel, coverage, depth, slope towards the second
+    /// sample).
     fn of(list: &[(u16, u64, u32, i32)], samples: u32, at_a_time: u64) -> u64 {
         let header = Header {
             width: 40,
             height: 4,
             pattern: SamplePattern {
                 name: "two".into(),
-                positions: vec![[0, 0], [8, 0]],
+                positions: vec![[0, 0], [-8, 0]],
                 nested: true,
             },
             background: [0.0; 3],
@@ -124,8 +125,8 @@ mod tests {
         };
         let options = WriteOptions { batch_rows: 3, ..WriteOptions::default() };
         let mut writer = TraceWriter::new(Vec::new(), "test", header, options).unwrap();
-        for (i, (x, coverage, z, dzdx)) in list.iter().enumerate() {
-            let depth = DepthPlane { z: Unorm32(*z), dzdx: *dzdx, dzdy: 0 };
+        for (i, (x, coverage, z, rise)) in list.iter().enumerate() {
+            let depth = DepthPlane { z: Unorm32(*z), dzdx: -*rise, dzdy: 0 };
             let coverage = SampleMask(*coverage);
             let (primitive, object) = (i as u32, 0);
             let (colour, alpha) = ([1.0; 3], 0.5);

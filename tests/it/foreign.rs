@@ -16,7 +16,7 @@ use screendoor::random::Stream;
 use screendoor::trace::{DepthPlane, Fragment, Header, SampleMask, Trace, Unorm32, ValueType};
 
 use crate::hostile::{arrow_file, arrow_stream, parts};
-use crate::util::{design, header, picture, random_fragments};
+use crate::util::{design, half_header as header, picture, random_fragments};
 
 const ROWS: usize = 90;
 

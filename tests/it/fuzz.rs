@@ -11,7 +11,7 @@ use crate::hostile;
 use crate::inputs::{INPUTS, named};
 use crate::loaders::damage::good_files;
 use crate::trace_file::unsealed;
-use crate::util::{header, random_fragments, trace_bytes};
+use crate::util::{half_header as header, random_fragments, trace_bytes};
 
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds")

@@ -20,7 +20,7 @@ use arrow_schema::{Field, Schema};
 use screendoor::capture::{Capture, CaptureOptions};
 use screendoor::trace::{Header, Trace, WriteOptions};
 
-use crate::util::{endlessly_scaled, header, random_fragments, trace_bytes};
+use crate::util::{endlessly_scaled, half_header as header, random_fragments, trace_bytes};
 
 /// A hostile file: its name, its bytes, what the error must say.
 struct Hostile {

@@ -13,7 +13,7 @@ use screendoor::report::export::{arrow, json_lines};
 use screendoor::study::record::Record;
 use screendoor::trace::{Checksums, Trace, statistics};
 
-use crate::util::{design, header, picture, random_fragments, trace_bytes};
+use crate::util::{design, half_header as header, picture, random_fragments, trace_bytes};
 
 fn document(name: &str) -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs").join(name);

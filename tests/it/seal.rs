@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use screendoor::trace::{Checksums, ColumnId, Compression, Scalar, Trace, WriteOptions};
 
 use crate::hostile::parts;
-use crate::util::{header, random_fragments, trace_bytes};
+use crate::util::{half_header as header, random_fragments, trace_bytes};
 
 /// Which seal is made.
 #[derive(Clone, Copy, PartialEq, Debug)]

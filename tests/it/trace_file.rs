@@ -7,7 +7,7 @@ use screendoor::trace::{
     WriteOptions, statistics,
 };
 
-use crate::util::{header, random_fragments, trace, trace_bytes};
+use crate::util::{half_header as header, random_fragments, trace, trace_bytes};
 
 const COMPRESSIONS: [Compression; 3] = [Compression::None, Compression::Lz4, Compression::Zstd];
 

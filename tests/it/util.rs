@@ -17,6 +17,11 @@ use screendoor::trace::{
     Unorm32, WriteOptions,
 };
 
+/// As [`header`], with colours in half precision, as captures have them by default.
+pub fn half_header(width: u32, height: u32, samples: u32) -> Header {
+    Header { colour: ColourFormat::F16, ..header(width, height, samples) }
+}
+
 /// A header for tests: `samples` samples at made-up places, black background.
 pub fn header(width: u32, height: u32, samples: u32) -> Header {
     let positions = (0..samples as i32).map(|s| [(s % 8 * 2 - 8) as i8, (s / 8 * 2 - 8) as i8]);

@@ -8,7 +8,7 @@ use screendoor::trace::{
 };
 
 use super::run;
-use crate::util::{header, random_fragments, trace_bytes};
+use crate::util::{half_header as header, random_fragments, trace_bytes};
 
 /// Holds what each of the three reads of a file to the others.
 const READ: &str = r#"
