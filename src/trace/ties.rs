@@ -61,7 +61,7 @@ fn tied(trace: &Trace, samples: u32, at_a_time: u64) -> Result<u64> {
                 rows.get_or_insert_with(tile, Vec::new).push((within, f.depth, coverage));
             }
         }
-        let of_tile = |(_, rows): (TileId, Vec<Row>)| tied_in_tile(rows, &positions);
+        let of_tile = |(_, rows): (TileId, Vec<Row>)| tied_in_tile(rows, positions);
         tied += rows.into_touched().into_par_iter().map(of_tile).sum::<u64>();
     }
     Ok(tied)
@@ -106,9 +106,11 @@ mod tests {
         ColourFormat, Fragment, Header, SamplePattern, TraceWriter, Unorm32, WriteOptions,
     };
 
-    /// The tied fragments of a list of (pixel, coverage, depth, slope towards the second
-    /// sample).
-    fn of(list: &[(u16, u64, u32, i32)], samples: u32, at_a_time: u64) -> u64 {
+    /// Pixel, coverage, depth, and how far the depth rises in a pixel towards the second sample.
+    type Placed = (u16, u64, u32, i32);
+
+    /// The tied fragments of a list.
+    fn of(list: &[Placed], samples: u32, at_a_time: u64) -> u64 {
         let header = Header {
             width: 40,
             height: 4,
@@ -139,7 +141,7 @@ mod tests {
 
     #[test]
     fn depths_are_shared_where_coverage_meets_and_nowhere_else() {
-        let cases: [(&[(u16, u64, u32, i32)], u64); 9] = [
+        let cases: [(&[Placed], u64); 9] = [
             (&[(0, 3, 5, 0), (0, 3, 6, 0)], 0),
             (&[(0, 3, 5, 0), (0, 2, 5, 0), (0, 1, 7, 0)], 2),
             // Pieces of one pixel, and pixels of one depth.
