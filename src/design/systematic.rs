@@ -110,7 +110,9 @@ impl Blueprint for Systematic {
         let apart = depth_bits::tells_apart(values);
         let basic = Promises {
             unbiased: Promise::always_if(apart && scrambled && !chance_decides_surfaces(values)),
-            consistent: Promise::always_if(apart),
+            // Unsorted, one surface's evenly spaced samples fall upon those of the one
+            // before it in the same way however many there are.
+            consistent: Promise::always_if(apart && values.flag(SORT.name)),
             order: OrderPromise::Dependent,
             exact_opaque: OpaquePromise::Always,
             seeded: true,

@@ -276,9 +276,10 @@ pub(in crate::rop) struct Sums<const N: usize> {
 }
 
 impl<const N: usize> Sums<N> {
-    fn add(&mut self, colour: [f32; 3], weight: f32, store: ColourStore) {
+    /// Adds a colour `share` times, which counts as `weight`.
+    fn add(&mut self, colour: [f32; 3], share: f32, weight: f32, store: ColourStore) {
         for (sum, c) in self.colour.iter_mut().zip(colour) {
-            *sum = store.channel(*sum + c * weight);
+            *sum = store.channel(*sum + c * share);
         }
         self.weight = store.channel(self.weight + weight);
     }
@@ -382,7 +383,8 @@ impl<S: Sampler<N>, const N: usize> Methods<S, N> {
         probe: &mut P,
     ) {
         probe.depth_test(fragment.coverage, visible);
-        sums.add(fragment.colour, fragment.alpha * visible.count() as f32, self.colour);
+        let share = fragment.alpha * visible.count() as f32;
+        sums.add(fragment.colour, share, share, self.colour);
         probe.written(visible);
         // One sum a pixel: with a box filter it holds what a multisample buffer would.
         let sum = self.colour.texel_bits();
@@ -466,10 +468,13 @@ impl<S: Sampler<N>, const N: usize> Transparent<N> for Methods<S, N> {
         match self.method {
             // The weight counts what was written: where that is nothing, see `resolve`.
             Method::Basic => samples.colour.iter().enumerate().for_each(|(s, c)| {
-                sums.add(*c, if sums.occupied.contains(s) { 1.0 } else { 0.0 }, self.colour);
+                let weight = if sums.occupied.contains(s) { 1.0 } else { 0.0 };
+                sums.add(*c, 1.0, weight, self.colour);
             }),
             Method::AlphaCorrection => {
-                sums.occupied.iter().for_each(|s| sums.add(samples.colour[s], 1.0, self.colour));
+                sums.occupied
+                    .iter()
+                    .for_each(|s| sums.add(samples.colour[s], 1.0, 1.0, self.colour));
             }
             Method::Depth => {
                 for s in (0..N).filter(|s| !sums.occupied.contains(*s)) {

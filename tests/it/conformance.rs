@@ -327,7 +327,9 @@ fn more_samples_come_nearer_where_that_is_promised_and_only_there() {
     // More layers than anyone keeps, of one object.
     let mut deep = layered(&header, 40, |i| (i * 3 % 40, [(i % 7) as f32 / 6.0; 3], 0.05));
     deep.iter_mut().for_each(|f| f.object = 0);
-    // The same covering some of the samples.
+    // Far to near, so that every sample passes every depth test.
+    let backwards = layered(&header, 4, |i| ((4 - i) << 20, [(i % 2) as f32; 3], 0.4));
+    // The same as at random, covering some of the samples.
     let mut pieces = random.clone();
     let some = random_fragments(&header, pieces.len(), 32);
     for (f, other) in pieces.iter_mut().zip(&some) {
@@ -344,10 +346,10 @@ fn more_samples_come_nearer_where_that_is_promised_and_only_there() {
             f.alpha = 1.0;
         }
     }
-    let traces = [&coherent, &random, &deep, &pieces, &equal, &shared]
+    let traces = [&coherent, &random, &deep, &backwards, &pieces, &equal, &shared]
         .map(|fragments| trace(&header, fragments));
     let tied = traces.each_ref().map(|trace| tied_fragments(trace, 64).unwrap() > 0);
-    assert_eq!(tied, [false, false, false, false, true, true]);
+    assert_eq!(tied, [false, false, false, false, false, true, true]);
     let mut wrong = Vec::new();
     for design in all_variants() {
         let gains = traces.each_ref().map(|trace| {
@@ -358,14 +360,20 @@ fn more_samples_come_nearer_where_that_is_promised_and_only_there() {
             // From 2 to 64 samples independent sampling gains √32 = 5.7.
             (error(2), error(64))
         });
-        let nearer = gains.map(|(few, many)| many * 4.0 <= few || many < ROUNDING);
-        let found = match nearer {
-            [true, true, true, true, true, true] => Promise::Always,
-            [true, true, true, true, ..] => Promise::DistinctDepths,
-            _ => Promise::Never,
+        // What holds where so much is gained on every trace, or on every one without ties.
+        let held = |least: f64| {
+            let nearer = gains.map(|(few, many)| many * least <= few || many < ROUNDING);
+            match nearer {
+                [true, true, true, true, true, true, true] => Promise::Always,
+                [true, true, true, true, true, ..] => Promise::DistinctDepths,
+                _ => Promise::Never,
+            }
         };
-        if found != design.promises().consistent {
-            wrong.push(format!("{} is consistent {found:?}: {gains:?}", design.label()));
+        // One seed each: what gains 3.5 may be consistent, and what gains 5 must be called so.
+        let (most, least) = (held(3.5), held(5.0));
+        if !(least..=most).contains(&design.promises().consistent) {
+            let name = design.label();
+            wrong.push(format!("{name} is consistent {least:?} to {most:?}: {gains:?}"));
         }
     }
     assert!(wrong.is_empty(), "{wrong:#?}");

@@ -77,8 +77,9 @@ fn inner_store() {
     }
 }
 
-fn sums_add(colour: vec3<f32>, weight: f32) {
-    sum_colour = stored3(sum_colour + rounded3(colour * weight));
+// Adds a colour `share` times, which counts as `weight`.
+fn sums_add(colour: vec3<f32>, share: f32, weight: f32) {
+    sum_colour = stored3(sum_colour + rounded3(colour * share));
     sum_weight = stored(sum_weight + weight);
 }
 
@@ -94,7 +95,8 @@ fn inner_draw(number: u32, f: Fragment, row: u32) {
     }
     let passed = depth_test(f, DEPTH_BUFFER_BITS);
     if DEPTH_BASED && pass_kind.kind == PASS_ACCUMULATE {
-        sums_add(f.colour, rounded(f.alpha * f32(mask_count(passed))));
+        let share = rounded(f.alpha * f32(mask_count(passed)));
+        sums_add(f.colour, share, share);
         return;
     }
     let written = choose(round_of(pass_kind.round), passed, f);
@@ -115,7 +117,7 @@ fn inner_end_pass(number: u32) {
     for (var s = 0u; s < SAMPLES; s++) {
         let holds = mask_contains(occupied, s);
         if METHOD_BASIC || (METHOD_ALPHA_CORRECTION && holds) {
-            sums_add(state_colour(AT_COLOUR + 3u * s), select(0.0, 1.0, holds));
+            sums_add(state_colour(AT_COLOUR + 3u * s), 1.0, select(0.0, 1.0, holds));
         }
         if METHOD_DEPTH && !holds {
             transmittance[s] += 1.0 / f32(ROUNDS);
