@@ -161,7 +161,7 @@ const DEFECTS: &[(&str, Threads, Defect)] = &[
     (
         "lk",
         Threads::Pixel,
-        ("(magnitude << 13u) + 0x38000000u", "(magnitude << 13u) + 0x38000001u"),
+        ("(magnitude << 13u) + 0x38000000u", "(magnitude << 13u) + 0x38002000u"),
     ),
     (
         "lk",
@@ -191,7 +191,10 @@ const DEFECTS: &[(&str, Threads, Defect)] = &[
     (
         "lk:method=depth-correction",
         Threads::Pixel,
-        ("sum_weight += weight;", "sum_weight += weight * 1.0000002;"),
+        (
+            "sum_weight = stored(sum_weight + weight);",
+            "sum_weight = stored(sum_weight + weight + 1.0);",
+        ),
     ),
     ("lk:method=alpha-correction", Threads::Pixel, ("<= opaque_depth[s]", "< opaque_depth[s]")),
     (
