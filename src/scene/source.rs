@@ -34,7 +34,7 @@ pub(super) fn ending(path: &Path) -> String {
 /// parameters, the file's ending and that it can be opened.
 ///
 /// # Errors
-/// As [`load`].
+/// As [`crate::scene::load`].
 pub fn check(source: &str) -> Result<()> {
     let Some(path) = path_of(source) else {
         return builtin::resolve(&source[BUILTIN.len()..])
