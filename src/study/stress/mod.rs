@@ -30,10 +30,10 @@ use crate::gpu::{Gpu, GpuOptions, TOLERANCE};
 use crate::param::Options;
 use crate::picture::Picture;
 use crate::rop::stochastic::{METHOD, Method};
-use crate::rop::{Promise, ReplayOptions, Which};
+use crate::rop::{Promise, ReplayOptions, Which, colour};
 use crate::study::engine::EngineName;
 use crate::study::stress::judge::Judge;
-use crate::trace::{Trace, tied_fragments};
+use crate::trace::{ColourFormat, Trace, tied_fragments};
 
 /// Seeds of cases with many fragments, at most.
 pub const HEAVY_SEEDS: u32 = 16;
@@ -245,6 +245,11 @@ fn findings(
             }
             let promised = trial.promised(design, tied)?;
             finding.broken = broken(&promised, &finding);
+            if finding.broken.is_some()
+                && let Some(outcome) = trial.outcome_of_single_precision(design)
+            {
+                finding.broken = broken(&promised, &Finding { outcome, ..finding.clone() });
+            }
             findings.push(finding);
         }
     }
@@ -335,6 +340,16 @@ impl Trial<'_> {
         let passes = design.build(&frame, Which::Reference)?.passes();
         let unbiased = design.promises().unbiased.holds(tied);
         Ok(OnCase { unbiased, finite: unbiased && passes == 1 })
+    }
+
+    /// What comes of a trace of half floats where the design stores and sums its colours in
+    /// single precision, of which alone it promises anything: sums in half floats lose what
+    /// is less than 3e-8. None where colours are that wide anyway, or the design stores none.
+    fn outcome_of_single_precision(&self, design: &Configured) -> Option<Outcome> {
+        let single = (colour::PARAM.name.to_string(), "32".to_string());
+        let wide = configure(&design.label(), &[single]).ok()?;
+        let narrow = self.case.colour == ColourFormat::F16;
+        narrow.then(|| self.outcome(&wide, &self.picture(&wide, Which::Reference, 0)))
     }
 
     fn on_gpu(&self, gpu: &Gpu, design: &Configured, plain: &Result<Picture>) -> Agreement {
