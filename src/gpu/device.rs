@@ -306,8 +306,9 @@ impl Gpu {
         entry: &str,
         layout: &wgpu::BindGroupLayout,
     ) -> Result<wgpu::ComputePipeline> {
-        /// Programs that are kept: enough for some designs at some sample counts.
-        const KEPT: usize = 64;
+        /// Programs that are kept: enough for every design at several sample counts, which
+        /// the suite of hard cases goes through again and again.
+        const KEPT: usize = 512;
         let key = (source.to_string(), entry.to_string());
         let mut pipelines = self.pipelines.lock().expect("no thread panicked");
         if let Some(pipeline) = pipelines.get(&key) {
