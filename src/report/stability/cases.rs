@@ -52,7 +52,9 @@ pub(super) fn text(text: &mut String, found: &Stability) {
          2^17 fragments); their bounds are crossed by chance alone anywhere in the table with a \
          probability of {} (Student's t, Bonferroni). What is promised to be unbiased and is off is \
          a broken promise, and so is an engine that differs. {tied} cases have fragments that share \
-         a depth at a sample: what is promised where depths differ ({}) may be off there.\n",
+         a depth at a sample: what is promised where depths differ ({}) may be off there. All is \
+         promised of colours of single precision: where sums of half floats are off, the same \
+         design with `colour=32` is held to it.\n",
         DECIDED,
         found.seeds,
         HEAVY_SEEDS,
