@@ -80,7 +80,7 @@ fn dither_pays_where_less_is_left_over_blocks() {
         })
     };
     assert_eq!(dithered(&trial(0.5, 1.0)).agreement, Agreement::Confirmed);
-    assert_eq!(dithered(&trial(1.0, 1.0)).agreement, Agreement::InPart);
+    assert_eq!(dithered(&trial(1.0, 1.0)).agreement, Agreement::Differs);
     let worse = dithered(&trial(1.1, 1.1));
     assert_eq!(worse.agreement, Agreement::Differs);
     assert!(worse.remark.contains("noisier") && worse.remark.contains("on some scenes"));
