@@ -12,7 +12,6 @@ use crate::cli::signals::on_interrupt;
 use crate::error::{Error, Result};
 use crate::output::OutputFile;
 use crate::param::Options;
-use crate::picture::write_png;
 use crate::report::html::{DesignText, answer};
 use crate::report::{About, PAGE, document, write_report};
 use crate::study::file::Study;
@@ -158,8 +157,8 @@ fn publications(runner: &Runner<'_>) -> Result<Vec<(String, String)>> {
         match measure_publication(*publication, None, Effort::brief(), told) {
             Ok(reproduced) => {
                 let document = document(&reproduced, ".");
-                for (name, picture) in &document.figures {
-                    write_png(store.verification_file(&format!("{name}.png")), picture)?;
+                for (name, drawn) in &document.figures {
+                    drawn.write(store.verification_file(&drawn.file(name)))?;
                 }
                 Store::put(&store.against_file(*publication), &document.against)?;
                 let path = store.document_file(*publication);

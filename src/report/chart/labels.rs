@@ -22,7 +22,7 @@ pub(super) struct Placed {
 
 /// Height of a line of text, and the mean width of its letters, at 12 units.
 const HEIGHT: f64 = 13.0;
-const LETTER: f64 = 6.3;
+const LETTER: f64 = 7.3;
 
 /// A place for each name that overlaps no mark and no other name and lies within `frame`;
 /// `None` where there is no such place: the legend names it.

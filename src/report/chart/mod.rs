@@ -2,12 +2,14 @@
 //! light, dark and print, and every mark carries its exact numbers. (`plotters`, the one
 //! library that writes SVG, bakes colours in.)
 
+mod alone;
 mod labels;
 mod plot;
 mod rows;
 mod scale;
 mod style;
 
+pub use alone::alone;
 pub use plot::{Axis, Curve, Mark, Names, Plot};
 pub use rows::{Bar, Row, Rows, Segment};
 pub use scale::{Kind, Scale, Tick};

@@ -168,7 +168,9 @@ fn state(content: &Content<'_>) -> Markup {
         let most = passes().max();
         cells.push(most.map_or(Cell::Missing("no result".into()), |n| between(passes(), n)));
         let largest = own(content.count).max_by_key(|r| r.state_bits.total());
-        cells.push(largest.map_or(Cell::Missing("no result".into()), |r| Cell::text(&r.layout)));
+        cells.push(largest.map_or(Cell::Missing("no result".into()), |r| {
+            Cell::Text(html! { span class="layout" { (r.layout) } })
+        }));
         cells
     };
     table(&header, &content.designs().iter().map(row).collect::<Vec<_>>())

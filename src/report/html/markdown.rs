@@ -203,9 +203,16 @@ fn number(text: &str) -> Markup {
 
 /// The signature that PNG files begin with.
 const PNG: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
+/// Of a chart that stands alone.
+const SVG: &[u8] = b"<svg xmlns=";
 
 /// A picture within the page, or what says that there is none.
 fn image(name: &str, alt: &str, bytes: Option<Vec<u8>>) -> Markup {
+    if let Some(svg) = bytes.as_deref().filter(|b| b.starts_with(SVG)) {
+        // As an image nothing in it runs, whoever wrote the file.
+        let source = format!("data:image/svg+xml;base64,{}", STANDARD.encode(svg));
+        return html! { img class="chart" src=(source) alt=(alt); };
+    }
     let Some(bytes) = bytes.filter(|b| b.starts_with(&PNG)) else {
         return html! { span class="nothing" { "Missing picture: " (name) } };
     };

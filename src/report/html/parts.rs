@@ -188,22 +188,31 @@ impl Cell {
     }
 }
 
-/// Half of an interval's width; too few runs bound nothing.
+/// Half of an interval's width, as finely as the value; too few runs bound nothing.
 fn half_width(e: Estimate, decimals: usize) -> String {
-    let half = e.half_width();
-    if half.is_finite() { fixed(half, decimals) } else { "∞".into() }
+    match e.half_width() {
+        half if !half.is_finite() => "∞".into(),
+        half if vanishes(e.value, decimals) && !may_be_none(e) => figures(half),
+        half => fixed(half, decimals),
+    }
 }
 
 /// An estimate's value; one that cannot be told from 0 has no more decimals than others.
 fn shown(e: Estimate, decimals: usize) -> String {
-    let may_be_none = e.low < 0.0 && e.high > 0.0;
-    if may_be_none { fixed(e.value, decimals) } else { rounded(e.value, decimals) }
+    if may_be_none(e) { fixed(e.value, decimals) } else { rounded(e.value, decimals) }
+}
+
+fn may_be_none(e: Estimate) -> bool {
+    e.low < 0.0 && e.high > 0.0
 }
 
 /// A value with so many decimals; with more where it would round to 0 and is not.
 pub(super) fn rounded(v: f64, decimals: usize) -> String {
-    let vanishes = v.abs() < 0.5 * 0.1_f64.powi(decimals as i32);
-    if vanishes { figures(v) } else { fixed(v, decimals) }
+    if vanishes(v, decimals) { figures(v) } else { fixed(v, decimals) }
+}
+
+fn vanishes(v: f64, decimals: usize) -> bool {
+    v.abs() < 0.5 * 0.1_f64.powi(decimals as i32)
 }
 
 /// A table that can be sorted by its columns and scrolls in its own box. A column's head

@@ -14,7 +14,7 @@ const SHOWN: [u32; 3] = [4, 8, 16];
 const BUDGETS: [f64; 5] = [48.0, 96.0, 192.0, 384.0, 768.0];
 
 /// The text of the part.
-pub(super) fn text(c: &Comparison) -> String {
+pub(super) fn text(c: &Comparison, folder: &str) -> String {
     let mut text = String::new();
     preamble(&mut text, c);
     for count in SHOWN {
@@ -23,7 +23,7 @@ pub(super) fn text(c: &Comparison) -> String {
     methods(&mut text, c);
     winners(&mut text, c);
     duels(&mut text, c);
-    text.push_str(&slab::text(c));
+    text.push_str(&slab::text(c, folder));
     text
 }
 

@@ -2,12 +2,16 @@
 
 use std::fmt::Write;
 
+use crate::metrics::Estimate;
+use crate::report::chart::{Axis, Curve, Kind, Mark, Names, Plot, Styles, alone};
 use crate::report::markdown_table;
+use crate::report::results::Drawn;
 use crate::report::results::against::{Against, Agreement};
 use crate::report::results::claims::{RMSE, SAME, frames, ratios};
 use crate::report::results::ratios::{Holding, holding};
 use crate::study::comparison::SLAB_LAYERS;
 use crate::study::publications::claims::{DIAL, DISCRETE, ENDS, Trial, TriedScene, dialled};
+use crate::study::throughput::Spread;
 
 /// Errors below this, in 8-bit units, are rounding.
 const ROUNDING: f64 = 0.01;
@@ -105,8 +109,58 @@ pub(super) fn against(trial: &Trial) -> Against {
     }
 }
 
+/// The chart's file, without its ending.
+const CHART: &str = "slab-dial";
+/// Families of designs whose colours scenes have here.
+const COLOURS: [&str; 4] = ["stochastic", "layered", "blended", "reference"];
+
+/// The dial as curves, one of each scene; none without results.
+pub(super) fn figures(trial: &Trial) -> Vec<(&'static str, Drawn)> {
+    let scenes = trial.scenes.iter().zip(COLOURS.iter().cycle());
+    let styles = Styles::new(scenes.map(|(scene, colour)| (scene.name, *colour)));
+    let curves = trial.scenes.iter().map(|scene| Curve {
+        series: scene.name.to_string(),
+        style: styles.of(scene.name),
+        facts: None,
+        marks: DIAL
+            .iter()
+            .filter_map(|bits| {
+                let [noise, bias] = split(scene, &dialled(*bits))?;
+                Some(Mark {
+                    id: None,
+                    samples: Some(*bits),
+                    cost: Spread { low: noise, median: noise, high: noise },
+                    error: Estimate { value: bias, low: bias, high: bias },
+                    says: format!(
+                        "{}, {}\nnoise {noise:.2}, bias {bias:.2}",
+                        scene.name,
+                        place(*bits)
+                    ),
+                    front: false,
+                    marked: true,
+                })
+            })
+            .collect(),
+    });
+    let plot = Plot {
+        title: "Noise and bias of SLAB as its coverage bits grow, scene by scene".to_string(),
+        x: Axis { title: "noise, 8-bit units".to_string(), kind: Kind::Log },
+        y: Axis { title: "bias, 8-bit units".to_string(), kind: Kind::Log },
+        size: [860.0, 480.0],
+        curves: curves.collect(),
+        front: false,
+        names: Names::At(DIAL[0]),
+        line: None,
+    };
+    plot.draw().map(|chart| (CHART, Drawn::Chart(alone(&chart)))).into_iter().collect()
+}
+
+fn place(bits: u32) -> String {
+    if bits == 0 { "b = ∞".to_string() } else { format!("b = {bits}") }
+}
+
 /// The section.
-pub(super) fn text(text: &mut String, trial: &Trial) {
+pub(super) fn text(text: &mut String, trial: &Trial, folder: &str) {
     against(trial).open(text);
     let _ = writeln!(
         text,
@@ -118,9 +172,8 @@ pub(super) fn text(text: &mut String, trial: &Trial) {
         ENDS[0],
         ENDS[1]
     );
-    let place = |bits: &u32| if *bits == 0 { "b = ∞".into() } else { format!("b = {bits}") };
     let mut columns: Vec<(String, String)> =
-        DIAL.iter().map(|bits| (place(bits), dialled(*bits))).collect();
+        DIAL.iter().map(|bits| (place(*bits), dialled(*bits))).collect();
     columns.insert(0, ("b = n, discrete".to_string(), DISCRETE.to_string()));
     columns.insert(0, ("stochastic".to_string(), ENDS[0].to_string()));
     columns.push(("k-buffer".to_string(), ENDS[1].to_string()));
@@ -143,12 +196,21 @@ pub(super) fn text(text: &mut String, trial: &Trial) {
     header.extend(columns.iter().map(|(name, _)| name.as_str()));
     text.push_str(&markdown_table(&header, &rows));
     text.push('\n');
+    for (name, figure) in figures(trial) {
+        let _ = writeln!(
+            text,
+            "![Curves of bias over noise.]({folder}/{})\n\n\
+             Bias over noise along the dial: each curve is a scene, each mark a place, from b = {} \
+             at its name to infinity, where no noise is left.\n",
+            figure.file(name),
+            DIAL[0]
+        );
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::metrics::Estimate;
     use crate::report::results::claims::tests::variant;
 
     /// A scene with noise and bias along the dial, its ends as given.

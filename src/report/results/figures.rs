@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use crate::picture::Picture;
+use crate::report::results::Drawn;
 use crate::report::{Panel, montage};
 use crate::study::publications::{NamedPicture, Publications};
 
@@ -104,7 +105,7 @@ pub const FIGURES: &[Figure] = &[
 const GALLERY: &str = "scenes";
 
 /// The document's figures: file names and pictures.
-pub(super) fn figures(publications: &Publications) -> Vec<(&'static str, Picture)> {
+pub(super) fn figures(publications: &Publications) -> Vec<(&'static str, Drawn)> {
     let scenes: Vec<Panel<'_>> = publications
         .gallery
         .iter()
@@ -112,14 +113,14 @@ pub(super) fn figures(publications: &Publications) -> Vec<(&'static str, Picture
         .collect();
     let mut list = Vec::new();
     if !scenes.is_empty() {
-        list.push((GALLERY, montage(&scenes, 4)));
+        list.push((GALLERY, Drawn::Picture(montage(&scenes, 4))));
     }
     list.extend(of(&publications.pictures));
     list
 }
 
 /// The figures that can be made of `pictures`.
-pub(super) fn of(pictures: &[NamedPicture]) -> Vec<(&'static str, Picture)> {
+pub(super) fn of(pictures: &[NamedPicture]) -> Vec<(&'static str, Drawn)> {
     let find = |name: &str| pictures.iter().find(|(n, _)| *n == name);
     FIGURES
         .iter()
@@ -135,7 +136,7 @@ pub(super) fn of(pictures: &[NamedPicture]) -> Vec<(&'static str, Picture)> {
                 Panel { picture, crop, enlarge: figure.enlarge }
             };
             let panels: Vec<Panel<'_>> = pictures?.into_iter().map(panel).collect();
-            Some((figure.file, montage(&panels, figure.columns)))
+            Some((figure.file, Drawn::Picture(montage(&panels, figure.columns))))
         })
         .collect()
 }

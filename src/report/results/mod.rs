@@ -16,15 +16,19 @@ mod summary;
 mod table_1;
 
 use std::fmt::Write;
+use std::path::PathBuf;
 
 pub use against::{Against, Agreement};
 pub use figures::{FIGURES, Figure};
 pub use summary::{check_marks, in_short};
 
+use crate::error::Result;
 use crate::metrics::Estimate;
+use crate::output::OutputFile;
 use crate::param::Options;
-use crate::picture::Picture;
+use crate::picture::{Picture, write_png};
 use crate::report::{markdown_table, stability};
+use crate::study::comparison::Comparison;
 use crate::study::file::Publication;
 use crate::study::publications::methods::Methods;
 use crate::study::publications::{Publications, Reproduced, RowDifference};
@@ -36,8 +40,38 @@ pub struct Document {
     pub markdown: String,
     /// What is printed, measured and found, of each section that has such.
     pub against: Vec<Against>,
-    /// The pictures that the text shows: file names without their ending `.png`.
-    pub figures: Vec<(&'static str, Picture)>,
+    /// What the text shows: file names without their endings.
+    pub figures: Vec<(&'static str, Drawn)>,
+}
+
+/// What a file of a document shows.
+#[derive(Clone, Debug)]
+pub enum Drawn {
+    /// A picture, as PNG.
+    Picture(Picture),
+    /// A chart, as SVG.
+    Chart(String),
+}
+
+impl Drawn {
+    /// The name of its file.
+    pub fn file(&self, name: &str) -> String {
+        match self {
+            Drawn::Picture(_) => format!("{name}.png"),
+            Drawn::Chart(_) => format!("{name}.svg"),
+        }
+    }
+
+    /// Writes it.
+    ///
+    /// # Errors
+    /// As [`write_png`] and [`OutputFile::put`].
+    pub fn write(&self, path: PathBuf) -> Result<()> {
+        match self {
+            Drawn::Picture(picture) => write_png(path, picture),
+            Drawn::Chart(svg) => OutputFile::put(path, svg.as_bytes()),
+        }
+    }
 }
 
 /// The document of what was measured. `folder` is where the figures lie, as seen from it.
@@ -59,11 +93,9 @@ pub fn document(measured: &Reproduced, folder: &str) -> Document {
             against.extend(claims::against(&m.claims));
             (methods_text(m, folder), against, figures::of(&m.pictures))
         }
-        Reproduced::Slab(c) => {
-            (slab::text(c), vec![slab::against(c), dial::against(&c.dial)], Vec::new())
-        }
+        Reproduced::Slab(c) => (slab::text(c, folder), slab_against(c), dial::figures(&c.dial)),
         Reproduced::Comparison(c) => {
-            (comparison::text(c), vec![slab::against(c), dial::against(&c.dial)], Vec::new())
+            (comparison::text(c, folder), slab_against(c), dial::figures(&c.dial))
         }
         Reproduced::Stability(s) => (stability::sections(s), Vec::new(), Vec::new()),
     };
@@ -126,12 +158,16 @@ fn laine_karras(p: &Publications, folder: &str) -> String {
     text
 }
 
+fn slab_against(c: &Comparison) -> Vec<Against> {
+    vec![slab::against(c), dial::against(&c.dial)]
+}
+
 fn methods_text(m: &Methods, folder: &str) -> String {
     let mut text = String::new();
     examples::text(&mut text, m);
     methods::text(&mut text, m);
-    claims::text(&mut text, &m.claims);
     figures::show(&mut text, &m.pictures, folder, |_| true);
+    claims::text(&mut text, &m.claims);
     text
 }
 
@@ -234,7 +270,7 @@ mod tests {
                 assert!(own.body.0.contains(&verdict), "{}", own.body.0);
                 named.push(against.section.clone());
             }
-            let made = document.figures.iter().map(|(name, _)| format!("{name}.png"));
+            let made = document.figures.iter().map(|(name, drawn)| drawn.file(name));
             let (mut made, mut asked) = (made.collect::<Vec<_>>(), asked.into_inner());
             made.sort();
             asked.sort();

@@ -110,7 +110,7 @@ pub(super) fn against(c: &Comparison) -> Against {
 }
 
 /// The section.
-pub(super) fn text(c: &Comparison) -> String {
+pub(super) fn text(c: &Comparison, folder: &str) -> String {
     let mut text = String::new();
     against(c).open(&mut text);
     let _ = writeln!(
@@ -145,7 +145,7 @@ pub(super) fn text(c: &Comparison) -> String {
     header.extend([better.as_str(), "state ÷ that of 8 samples"]);
     text.push_str(&markdown_table(&header, &rows));
     errors(&mut text, c);
-    dial::text(&mut text, &c.dial);
+    dial::text(&mut text, &c.dial, folder);
     text
 }
 
