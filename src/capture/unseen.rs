@@ -68,9 +68,9 @@ const REASONS: [(Reason, &str); 6] = [
     (Reason::Transparent, "wholly transparent"),
     (Reason::Outside, "outside the frame"),
     (Reason::Behind, "behind the camera"),
-    (Reason::Back, "seen from behind, and their material is one-sided"),
+    (Reason::Back, "seen from behind, which the material hides"),
     (Reason::NoArea, "without an area"),
-    (Reason::Thin, "so small that they cover no sample"),
+    (Reason::Thin, "so small that no sample is covered"),
 ];
 
 impl Capture<'_> {
@@ -189,6 +189,57 @@ fn said(counts: [u64; REASONS.len()], transparent: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::capture::{CameraOptions, CaptureOptions};
+    use crate::scene::{Mesh, Scene, Shape};
+    use glam::Vec3;
+
+    /// A triangle with its middle at `at`, which faces +z, or with `turn` away from it.
+    fn triangle(at: Vec3, turn: bool) -> Shape {
+        let mut corners = [Vec3::new(-1.0, -1.0, 0.0), Vec3::new(1.0, -1.0, 0.0), Vec3::Y];
+        if turn {
+            corners.swap(0, 1);
+        }
+        let positions = corners.map(|c| c + at).to_vec();
+        Shape::Mesh(Mesh { positions, triangles: vec![[0, 1, 2]], ..Mesh::default() })
+    }
+
+    #[test]
+    fn what_is_out_of_sight_is_told_as_that() {
+        let material = Material { double_sided: false, ..Material::default() };
+        let mut scene = Scene { materials: vec![material], ..Scene::default() };
+        scene.add("seen", triangle(Vec3::ZERO, false));
+        scene.add("back", triangle(Vec3::ZERO, true));
+        scene.add("aside", triangle(Vec3::new(60.0, 0.0, 0.0), false));
+        scene.add("behind", triangle(Vec3::new(0.0, 0.0, 60.0), false));
+        scene.add("other side", triangle(Vec3::new(0.0, 0.0, -60.0), false));
+        scene.add("other side", triangle(Vec3::new(-60.0, 0.0, 0.0), false));
+        let camera = CameraOptions {
+            angle: Some([0.0, 0.0]),
+            distance: Some(0.25),
+            field_of_view: Some(30.0),
+        };
+        let options = CaptureOptions {
+            width: 32,
+            height: 32,
+            samples: 1,
+            camera,
+            ..CaptureOptions::default()
+        };
+        let capture = Capture::new(&scene, &options).unwrap();
+        capture.to_memory(|_, _| ()).unwrap();
+        let reasons: Vec<(u32, String)> =
+            capture.unseen().into_iter().map(|u| (u.object, u.reason)).collect();
+        let one = |text: &str| format!("its one triangle is {text}");
+        assert_eq!(
+            reasons,
+            [
+                (1, one("seen from behind, which the material hides")),
+                (2, one("outside the frame")),
+                (3, one("behind the camera")),
+                (5, one("outside the frame")),
+            ]
+        );
+    }
 
     #[test]
     fn reasons_are_counted_and_listed_as_they_are_numbered() {
