@@ -42,7 +42,7 @@ impl Type {
         }
     }
 
-    /// What integers of the type are divided by where they stand for shares of 1.
+    /// What integers of the type are shares of, where they stand for shares of 1.
     fn whole(self) -> f32 {
         match self {
             Type::I8 => 127.0,
@@ -141,7 +141,7 @@ impl Loader<'_> {
             Normalised::AsSaid => accessor.normalized,
             Normalised::Never => false,
         };
-        let (whole, least) = if normalised { (of.whole(), -1.0) } else { (1.0, f32::MIN) };
+        let (unit, least) = if normalised { (of.whole().recip(), -1.0) } else { (1.0, f32::MIN) };
         self.count(elements, zeros, &part)?;
         let (accessor, _) = self.accessor(index, &part)?;
         let size = of.size();
@@ -150,7 +150,7 @@ impl Loader<'_> {
             for (k, slot) in numbers[width * at..][..width].iter_mut().enumerate() {
                 let number = of.number(&bytes[size * k..]);
                 // Floats as they are, be they infinite.
-                *slot = if of == Type::F32 { number } else { (number / whole).max(least) };
+                *slot = if of == Type::F32 { number } else { (number * unit).max(least) };
             }
         };
         self.each_element(accessor, width * size, &part, |at, b| put(at, b, &mut numbers))?;
@@ -302,9 +302,11 @@ mod tests {
 
     #[test]
     fn integers_are_shares_of_the_largest() {
-        assert_eq!(Type::I8.number(&[0x81]) / Type::I8.whole(), -1.0);
-        assert_eq!(Type::U16.number(&[0xff, 0xff]) / Type::U16.whole(), 1.0);
-        assert_eq!(Type::I16.number(&[0x01, 0x80]) / Type::I16.whole(), -1.0);
+        let share = |of: Type, bytes: &[u8]| of.number(bytes) * of.whole().recip();
+        assert_eq!(share(Type::I8, &[0x81]), -1.0);
+        assert_eq!(share(Type::U8, &[0xff]), 1.0);
+        assert_eq!(share(Type::U16, &[0xff, 0xff]), 1.0);
+        assert_eq!(share(Type::I16, &[0x01, 0x80]), -1.0);
         assert_eq!(Type::U32.index(&[1, 0, 0, 1]), 0x0100_0001);
     }
 }

@@ -18,8 +18,11 @@ pub(super) const SETS: usize = 2;
 pub(super) struct Made {
     /// Which of the scene's materials.
     pub material: usize,
-    /// The sets of texture coordinates that it uses, by the file's numbers.
+    /// The sets of texture coordinates that it uses, by the file's numbers; the first one
+    /// where it has no texture, for one that may be put on it.
     pub sets: Vec<u32>,
+    /// Whether it has a texture.
+    pub textured: bool,
     /// What of it is not drawn.
     pub matters: Vec<Matter>,
 }
@@ -117,8 +120,12 @@ impl Loader<'_> {
             emissive_texture,
             unlit,
         });
-        let Gathered { sets, matters } = gathered;
-        Ok(Made { material: self.scene.materials.len() - 1, sets, matters })
+        let Gathered { mut sets, matters } = gathered;
+        let textured = !sets.is_empty();
+        if !textured {
+            sets.push(0);
+        }
+        Ok(Made { material: self.scene.materials.len() - 1, sets, textured, matters })
     }
 
     /// Tells of the textures that a diffuse surface has no use for.

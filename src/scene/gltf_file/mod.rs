@@ -171,7 +171,8 @@ impl<'a> Loader<'a> {
         if root.scenes.len() > 1 {
             let name = one_line(scene.name.as_deref().unwrap_or(""));
             let what = format_args!("of its {} scenes only '{name}' is drawn", root.scenes.len());
-            self.told.matter(what);
+            let others = self.told.matter_of("other scene", what);
+            self.told.concerns([others], root.scenes.len() - 1);
         }
         self.told.extensions(scene.extensions.names());
         let played = match &root.animations[..] {

@@ -112,7 +112,6 @@ impl Loader<'_> {
         joints: Option<&Joints>,
         part: &str,
     ) -> Result<Drawn> {
-        let mut matters = self.told.extensions(primitive.extensions.names());
         let mode = match primitive.mode.unwrap_or(4) {
             0 => Mode::Points,
             1..=3 => Mode::Lines,
@@ -124,7 +123,13 @@ impl Loader<'_> {
                 return Err(self.bad(part, what, "export the file again"));
             }
         };
-        if let Some(missed) = self.not_drawn(primitive, mode) {
+        let unit = match mode {
+            Mode::Points => "point",
+            Mode::Lines => "line",
+            _ => "triangle",
+        };
+        let mut matters = self.told.extensions_of(unit, primitive.extensions.names());
+        if let Some(missed) = self.not_drawn(primitive, mode, unit) {
             matters.push(missed);
             let items = self.claimed_items(primitive, mode);
             return Ok(Drawn { shape: None, items, matters, in_scene: false });
@@ -165,10 +170,15 @@ impl Loader<'_> {
     }
 
     /// Why nothing is drawn of a primitive, where that is so.
-    fn not_drawn(&mut self, primitive: &Primitive, mode: Mode) -> Option<Matter> {
+    fn not_drawn(
+        &mut self,
+        primitive: &Primitive,
+        mode: Mode,
+        unit: &'static str,
+    ) -> Option<Matter> {
         match mode {
-            Mode::Points => return Some(self.told.matter_of("point", "points are not drawn")),
-            Mode::Lines => return Some(self.told.matter_of("line", "lines are not drawn")),
+            Mode::Points => return Some(self.told.matter_of(unit, "points are not drawn")),
+            Mode::Lines => return Some(self.told.matter_of(unit, "lines are not drawn")),
             _ => {}
         }
         let position = primitive.attributes.get("POSITION");
@@ -236,7 +246,7 @@ impl Loader<'_> {
     /// What is told of textures whose coordinates a primitive does not have.
     fn missing_sets(&mut self, made: &Made, vertices: &Vertices) -> Option<Matter> {
         let missing = made.sets.iter().zip(&vertices.uvs).find(|(_, uvs)| uvs.is_empty());
-        let (set, _) = missing?;
+        let (set, _) = missing.filter(|_| made.textured)?;
         let what =
             format_args!("the texture coordinates TEXCOORD_{set} of materials are not there");
         Some(self.told.matter(what))

@@ -51,11 +51,21 @@ impl Told {
 
     /// The matters of extensions by these names: of those that are not read.
     pub fn extensions<'n>(&mut self, names: impl IntoIterator<Item = &'n str>) -> Vec<Matter> {
+        self.extensions_of("triangle", names)
+    }
+
+    /// The same of what is counted in other units.
+    pub fn extensions_of<'n>(
+        &mut self,
+        unit: &'static str,
+        names: impl IntoIterator<Item = &'n str>,
+    ) -> Vec<Matter> {
         let told = names.into_iter().filter_map(|name| match treatment(name) {
             // What is packed is told where its bytes are missed.
             Treatment::Read | Treatment::Passed | Treatment::Packed => None,
             Treatment::Warned(why) | Treatment::Unknown(why) => {
-                Some(self.matter(format_args!("{} is not read: {why}", shortened(name))))
+                let what = format_args!("{} is not read: {why}", shortened(name));
+                Some(self.matter_of(unit, what))
             }
         });
         told.collect()

@@ -73,7 +73,8 @@ pub(super) fn load(path: &Path, wanted: Option<&str>) -> Result<Scene> {
         return Err(Error::invalid(&place, what, "give one with a density above 0"));
     }
     let mut left_out: Vec<String> = Vec::new();
-    if entries.len() > 1 {
+    // Who names one knows what is left out.
+    if entries.len() > 1 && wanted.is_none() {
         let others = entries.iter().enumerate().filter(|(i, _)| *i != number);
         let others = others.map(|(i, entry)| match level_sets.contains(&i) {
             true => format!("'{}', a level set", entry.name),
