@@ -242,7 +242,7 @@ impl Told<'_> {
         console: &Console,
     ) -> Result<Recorded> {
         let draw = |writer: &mut Writer, told: Progress<'_>| capture.draw(writer, told);
-        self.into_file(capture.header(), draw, || capture.unseen(), write, file, console)
+        self.write(capture.header(), draw, || capture.unseen(), write, file, console)
     }
 
     fn record_by_gpu(
@@ -253,21 +253,21 @@ impl Told<'_> {
         console: &Console,
     ) -> Result<Recorded> {
         let draw = |writer: &mut Writer, told: Progress<'_>| capture.draw(writer, told);
-        self.into_file(capture.header(), draw, || capture.unseen(), write, file, console)
+        self.write(capture.header(), draw, || capture.unseen(), write, file, console)
     }
 
-    fn into_file(
+    fn write(
         &self,
         header: &Header,
         draw: impl FnOnce(&mut Writer, Progress<'_>) -> Result<()>,
         unseen: impl FnOnce() -> Vec<Unseen>,
-        write: WriteOptions,
+        options: WriteOptions,
         file: OutputFile,
         console: &Console,
     ) -> Result<Recorded> {
         self.warn(&self.scene.warnings, console)?;
         let place = file.path().display().to_string();
-        let mut writer = TraceWriter::new(file, &place, header.clone(), write)?;
+        let mut writer = TraceWriter::new(file, &place, header.clone(), options)?;
         let progress = console.progress("capturing", "triangles");
         draw(&mut writer, &mut |done, total| progress.set(done, total))?;
         drop(progress);

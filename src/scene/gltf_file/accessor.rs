@@ -212,6 +212,10 @@ impl Loader<'_> {
         if accessor.sparse.as_ref().is_some_and(|sparse| sparse.count > accessor.count) {
             return bad("it has more sparse values than elements");
         }
+        if let Some(view) = accessor.buffer_view {
+            let size = width * of.size();
+            drop(self.elements(view, accessor.byte_offset, size, accessor.count, part)?);
+        }
         Ok((width, of))
     }
 

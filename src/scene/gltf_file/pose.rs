@@ -167,8 +167,13 @@ impl Loader<'_> {
 /// How much of a vertex each joint moves.
 pub(super) struct Bound<'j> {
     pub joints: &'j [DAffine3],
-    /// Numbers of joints and their weights, sets of four each, vertex by vertex.
-    pub sets: Vec<(Vec<[f32; 4]>, Vec<[f32; 4]>)>,
+    pub sets: Vec<Set>,
+}
+
+/// Four joints of each vertex, and their weights.
+pub(super) struct Set {
+    pub joints: Vec<[f32; 4]>,
+    pub weights: Vec<[f32; 4]>,
 }
 
 impl Bound<'_> {
@@ -178,7 +183,7 @@ impl Bound<'_> {
     pub fn at(&self, i: usize) -> Option<DAffine3> {
         let mut moved = DAffine3 { matrix3: DMat3::ZERO, translation: DVec3::ZERO };
         let mut sum = 0.0;
-        for (joints, weights) in &self.sets {
+        for Set { joints, weights } in &self.sets {
             for (joint, weight) in joints[i].into_iter().zip(weights[i]) {
                 if weight == 0.0 {
                     continue;
@@ -214,7 +219,7 @@ mod tests {
     fn vertices_follow_their_joints_by_their_weights() {
         let joints = [DVec3::X, DVec3::Y].map(DAffine3::from_translation);
         let bound = |joint: [f32; 4], weights: [f32; 4]| {
-            let sets = vec![(vec![joint], vec![weights])];
+            let sets = vec![Set { joints: vec![joint], weights: vec![weights] }];
             Bound { joints: &joints, sets }.at(0).map(|m| m.transform_point3(DVec3::Z))
         };
         let half = DVec3::new(0.5, 0.5, 1.0);

@@ -7,7 +7,7 @@ use super::Loader;
 use super::accessor::{Kind, Normalised, Numbers, Type};
 use super::json::{Attributes, Node, Primitive};
 use super::material::{Made, SETS};
-use super::pose::{Bound, Joints, normal_matrix};
+use super::pose::{Bound, Joints, Set, normal_matrix};
 use super::told::Matter;
 use crate::error::Result;
 use crate::scene::{Mesh, Shape};
@@ -312,7 +312,8 @@ impl Loader<'_> {
                 let what = format!("not all of its {count} vertices have joints and weights");
                 return Err(self.bad(part, what, "export the file again"));
             }
-            bound.sets.push((joints.arrays(0.0).collect(), weights.arrays(0.0).collect()));
+            let (joints, weights) = (joints.arrays(0.0).collect(), weights.arrays(0.0).collect());
+            bound.sets.push(Set { joints, weights });
         }
         if bound.sets.is_empty() {
             return Ok(false);
