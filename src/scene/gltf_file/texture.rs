@@ -126,3 +126,34 @@ fn sampling(sampler: &Sampler) -> Result<Sampling, (&'static str, u32)> {
     let wrap = [wrap("wrapS", sampler.wrap_s)?, wrap("wrapT", sampler.wrap_t)?];
     Ok(Sampling { wrap, magnify, minify, levels })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samplers_are_read_by_their_numbers() {
+        use Filter::{Linear, Nearest};
+        assert_eq!(sampling(&Sampler::default()), Ok(Sampling::default()));
+        let minified = [
+            (9728, Nearest, None),
+            (9729, Linear, None),
+            (9984, Nearest, Some(Nearest)),
+            (9985, Linear, Some(Nearest)),
+            (9986, Nearest, Some(Linear)),
+            (9987, Linear, Some(Linear)),
+        ];
+        for (number, minify, levels) in minified {
+            let said = Sampler { min_filter: Some(number), ..Sampler::default() };
+            let read = sampling(&said).unwrap();
+            assert_eq!((read.minify, read.levels, read.magnify), (minify, levels, Linear));
+        }
+        let wraps = [(10497, Wrap::Repeat), (33071, Wrap::Clamp), (33648, Wrap::Mirror)];
+        for (number, wrap) in wraps {
+            let said = Sampler { wrap_t: Some(number), ..Sampler::default() };
+            assert_eq!(sampling(&said).unwrap().wrap, [Wrap::Repeat, wrap]);
+        }
+        let mipped = Sampler { mag_filter: Some(9987), ..Sampler::default() };
+        assert_eq!(sampling(&mipped), Err(("magFilter", 9987)));
+    }
+}

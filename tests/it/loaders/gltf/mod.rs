@@ -1,5 +1,7 @@
 //! glTF.
 
+mod core_rows;
+mod extension_rows;
 mod inputs;
 mod model;
 mod table;
