@@ -12,7 +12,8 @@ pub(crate) struct Vertex {
     pub position: DVec3,
     /// Not necessarily of unit length.
     pub normal: Vec3,
-    pub uv: Vec2,
+    /// The two sets of texture coordinates.
+    pub uvs: [Vec2; 2],
     pub colour: Vec4,
 }
 
@@ -49,6 +50,11 @@ impl<'a> Geometry<'a> {
     /// How many triangles there are.
     pub fn len(&self) -> u32 {
         *self.starts.last().expect("never empty")
+    }
+
+    /// The triangles of an object.
+    pub fn of_object(&self, object: usize) -> std::ops::Range<u32> {
+        self.starts[object]..self.starts[object + 1]
     }
 
     /// Triangle `primitive`.
@@ -107,7 +113,7 @@ fn mesh_triangle(mesh: &Mesh, local: u32, place: &Place) -> [Vertex; 3] {
                 Some(n) => (place.normals * n.as_dvec3()).as_vec3(),
                 None => flat(),
             },
-            uv: mesh.uvs.get(i).copied().unwrap_or(Vec2::ZERO),
+            uvs: [&mesh.uvs, &mesh.more_uvs].map(|uvs| uvs.get(i).copied().unwrap_or(Vec2::ZERO)),
             colour: mesh.colours.get(i).copied().unwrap_or(Vec4::ONE),
         }
     })
@@ -139,7 +145,8 @@ fn strand_triangle(
         Vertex {
             position: at(i) + across * (side * width),
             normal: (towards + across * (side * RIBBON_ROUNDNESS)).as_vec3(),
-            uv: Vec2::new(side as f32 * 0.5 + 0.5, (i - first) as f32 / (end - 1 - first) as f32),
+            uvs: [Vec2::new(side as f32 * 0.5 + 0.5, (i - first) as f32 / (end - 1 - first) as f32);
+                2],
             colour: strands.colours.get(curve).copied().unwrap_or(Vec4::ONE),
         }
     };
@@ -200,7 +207,7 @@ fn particle_triangle(
         position: centre + x_axis * (x * size[0]) + y_axis * (y * size[1]),
         // Bulging towards the camera, as a puff of smoke would.
         normal: (camera.back + (x_axis * x + y_axis * y) * 0.7).as_vec3(),
-        uv: Vec2::new(x as f32 * 0.5 + 0.5, 0.5 - y as f32 * 0.5),
+        uvs: [Vec2::new(x as f32 * 0.5 + 0.5, 0.5 - y as f32 * 0.5); 2],
         colour: particles.colours.get(i).copied().unwrap_or(Vec4::ONE),
     };
     if local.is_multiple_of(2) {

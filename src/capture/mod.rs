@@ -14,6 +14,7 @@ mod pattern;
 mod raster;
 mod setup;
 mod shade;
+mod unseen;
 
 use std::io::Write;
 
@@ -23,11 +24,13 @@ pub use camera::{Camera, CameraOptions};
 pub(crate) use covered::{Drawing, SetUp};
 pub use order::Order;
 pub use pattern::{PatternKind, pattern};
+pub use unseen::Unseen;
 
 use crate::capture::geometry::{Geometry, Triangle};
 use crate::capture::raster::Raster;
 use crate::capture::setup::{STEPS, ScreenTriangle, set_up};
 use crate::capture::shade::Shader;
+use crate::capture::unseen::Recorded;
 use crate::error::{Error, Result};
 use crate::scene::Scene;
 use crate::trace::{
@@ -94,6 +97,7 @@ pub struct Capture<'a> {
     options: &'a CaptureOptions,
     camera: Camera,
     header: Header,
+    recorded: Recorded,
 }
 
 /// Triangles set up at a time.
@@ -141,7 +145,8 @@ impl<'a> Capture<'a> {
         if let Some(alpha) = Shader::new(scene, &camera, options.alpha).constant_alpha() {
             header.constants.insert(ColumnId::Alpha, Scalar::Real(alpha));
         }
-        Ok(Capture { scene, options, camera, header })
+        let recorded = Recorded::new(scene.objects.len());
+        Ok(Capture { scene, options, camera, header, recorded })
     }
 
     /// The header of the trace that the capture makes.
@@ -185,7 +190,7 @@ impl<'a> Capture<'a> {
                 rest = later;
                 let mut done = Vec::new();
                 let (written, ()) = rayon::join(
-                    || write_all(writer, std::mem::take(&mut finished)),
+                    || self.write_all(writer, std::mem::take(&mut finished)),
                     || {
                         wave.par_iter()
                             .map(|job| job.run(&drawn, &offsets, size, &shader))
@@ -197,7 +202,7 @@ impl<'a> Capture<'a> {
             }
             progress(end as u64, total as u64);
         }
-        write_all(writer, finished)
+        self.write_all(writer, finished)
     }
 
     /// Draws the scene into a trace in memory.
@@ -221,16 +226,30 @@ impl<'a> Capture<'a> {
         }
     }
 
+    fn write_all<W: Write>(
+        &self,
+        writer: &mut TraceWriter<W>,
+        fragments: Vec<Vec<Fragment>>,
+    ) -> Result<()> {
+        fragments.iter().flatten().try_for_each(|fragment| self.write(writer, fragment))
+    }
+
+    /// Writes a fragment, and notes that its object has one.
+    pub(crate) fn write<W: Write>(
+        &self,
+        writer: &mut TraceWriter<W>,
+        fragment: &Fragment,
+    ) -> Result<()> {
+        self.recorded.mark(fragment.object);
+        writer.push(fragment)
+    }
+
     fn prepare(&self, triangle: Triangle, shader: &Shader<'_>) -> Drawn {
         let keep_back = self.keeps_back(&triangle, shader);
         let mut pieces = Vec::new();
         set_up(&triangle, &self.camera, keep_back, &mut pieces);
         Drawn { triangle, pieces }
     }
-}
-
-fn write_all<W: Write>(writer: &mut TraceWriter<W>, fragments: Vec<Vec<Fragment>>) -> Result<()> {
-    fragments.iter().flatten().try_for_each(|fragment| writer.push(fragment))
 }
 
 /// A triangle and what clipping left of it.

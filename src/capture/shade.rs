@@ -17,7 +17,7 @@ const AMBIENT: f32 = 0.10;
 
 /// What is less opaque than half a step of a 16-bit texture is the tail of a
 /// filter, not a surface: it is not recorded.
-const LEAST_ALPHA: f32 = 0.5 / 65535.0;
+pub(super) const LEAST_ALPHA: f32 = 0.5 / 65535.0;
 
 /// Shades fragments of a scene.
 pub(crate) struct Shader<'a> {
@@ -90,12 +90,12 @@ impl<'a> Shader<'a> {
         let [_, w1, w2] = weights.at.map(|w| w as f32);
         let colour = a.colour + (b.colour - a.colour) * w1 + (c.colour - a.colour) * w2;
         let mut base = material.base * colour;
-        // The weights' changes add up to 0.
-        let turned = |w: &[f64; 3]| (b.uv - a.uv) * w[1] as f32 + (c.uv - a.uv) * w[2] as f32;
-        let uv = a.uv + turned(&weights.at);
         let texel = |t: TextureUse| {
+            let [a, b, c] = triangle.vertices.each_ref().map(|v| v.uvs[t.set]);
+            // The weights' changes add up to 0.
+            let turned = |w: &[f64; 3]| (b - a) * w[1] as f32 + (c - a) * w[2] as f32;
             let turn = |v: Vec2| t.transform.matrix2 * v;
-            let at = t.transform.transform_point2(uv);
+            let at = t.transform.transform_point2(a + turned(&weights.at));
             let (dx, dy) = (turn(turned(&weights.dx)), turn(turned(&weights.dy)));
             self.scene.textures[t.texture].sample(at, dx, dy)
         };
@@ -119,7 +119,9 @@ impl<'a> Shader<'a> {
         };
         if self.alpha.is_none() && material.transmission > 0.0 {
             let tint = (base.x + base.y + base.z) / 3.0;
-            alpha *= 1.0 - material.transmission.clamp(0.0, 1.0) * tint.clamp(0.0, 1.0);
+            let share = material.transmission_texture.map_or(1.0, |t| texel(t).x);
+            let through = material.transmission.clamp(0.0, 1.0) * share;
+            alpha *= 1.0 - through * tint.clamp(0.0, 1.0);
         }
         let alpha = alpha.clamp(0.0, 1.0);
         if alpha.is_nan() || alpha < LEAST_ALPHA {

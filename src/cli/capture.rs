@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde::Serialize;
 
-use crate::capture::{CameraOptions, Capture, CaptureOptions, Faces, Order, PatternKind};
+use crate::capture::{CameraOptions, Capture, CaptureOptions, Faces, Order, PatternKind, Unseen};
 use crate::cli::arguments::{self, colour, numbers, option, samples, size};
 use crate::cli::console::{Console, grouped, shown, table};
 use crate::cli::files::{JsonArgument, check, check_scene, report};
@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::capture::{CrossCheck, GpuCapture};
 use crate::output::OutputFile;
-use crate::scene::{self, Scene};
+use crate::scene::{self, LoadOptions, Scene};
 use crate::trace::{
     ColourFormat, ColumnId, Compression, Header, Scalar, TraceWriter, WriteOptions, Written,
 };
@@ -47,6 +47,12 @@ pub(super) struct Arguments {
     /// A PNG or JPEG for surfaces that have no texture
     #[arg(long, value_name = "FILE")]
     texture: Option<PathBuf>,
+    /// Which grid of a .vdb file to draw: 'density' or the first fog volume where not given
+    #[arg(long, value_name = "NAME")]
+    grid: Option<String>,
+    /// Write nothing where there is anything to warn of
+    #[arg(long)]
+    strict: bool,
     /// Make every surface white, keeping alphas
     #[arg(long)]
     white: bool,
@@ -100,6 +106,8 @@ struct Document<'a> {
     fragments: u64,
     bytes: u64,
     content: &'a str,
+    /// Objects of which nothing was recorded.
+    unseen: &'a [Unseen],
     /// With `--check`: where the GPU's rasteriser and ours differ.
     check: Option<CrossCheck>,
 }
@@ -123,7 +131,8 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let file = OutputFile::create(&arguments.output)?;
     let json = arguments.json.open()?;
     let loading = console.progress("loading the scene", "");
-    let mut scene = scene::load(source)?;
+    let load = LoadOptions { grid: arguments.grid.clone() };
+    let mut scene = scene::load_with(source, &load)?;
     drop(loading);
     if let Some(texture) = &arguments.texture {
         scene.apply_texture(texture)?;
@@ -156,11 +165,12 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         },
     };
     let write = WriteOptions { compression: arguments.compress, ..WriteOptions::default() };
-    let (written, differences) = match &gpu {
-        None => (record(&scene, &options, write, file, console)?, None),
+    let told = Told { scene: &scene, unseen: true, strict: arguments.strict };
+    let ((written, unseen), differences) = match &gpu {
+        None => (told.record(&Capture::new(&scene, &options)?, write, file, console)?, None),
         Some(gpu) => {
             let capture = GpuCapture::new(gpu, &scene, &options)?;
-            let recorded = record_by_gpu(&scene, &capture, write, file, console)?;
+            let recorded = told.record_by_gpu(&capture, write, file, console)?;
             let found = arguments.check.then(|| cross_check(&capture, console)).transpose()?;
             (recorded, found)
         }
@@ -174,6 +184,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         fragments: written.rows,
         bytes: written.bytes,
         content: &written.content,
+        unseen: &unseen,
         check: differences,
     };
     report(json, "screendoor.capture", &document, console, || {
@@ -200,49 +211,99 @@ pub(super) fn record(
     file: OutputFile,
     console: &Console,
 ) -> Result<Written> {
-    let capture = Capture::new(scene, options)?;
-    let draw = |writer: &mut Writer, told: Told<'_>| capture.draw(writer, told);
-    into_file(scene, capture.header(), draw, write, file, console)
-}
-
-/// The same by a GPU.
-fn record_by_gpu(
-    scene: &Scene,
-    capture: &GpuCapture<'_>,
-    write: WriteOptions,
-    file: OutputFile,
-    console: &Console,
-) -> Result<Written> {
-    let draw = |writer: &mut Writer, told: Told<'_>| capture.draw(writer, told);
-    into_file(scene, capture.header(), draw, write, file, console)
+    let told = Told { scene, unseen: false, strict: false };
+    told.record(&Capture::new(scene, options)?, write, file, console).map(|(written, _)| written)
 }
 
 type Writer = TraceWriter<OutputFile>;
-type Told<'a> = &'a mut (dyn FnMut(u64, u64) + Send);
+type Progress<'a> = &'a mut (dyn FnMut(u64, u64) + Send);
 
-fn into_file(
-    scene: &Scene,
-    header: &Header,
-    draw: impl FnOnce(&mut Writer, Told<'_>) -> Result<()>,
-    write: WriteOptions,
-    file: OutputFile,
-    console: &Console,
-) -> Result<Written> {
-    for warning in &scene.warnings {
-        console.warn(warning);
+/// The most objects without fragments that are listed one by one.
+const MOST_UNSEEN: usize = 20;
+
+/// What is told of a capture.
+struct Told<'a> {
+    scene: &'a Scene,
+    /// Whether objects without fragments are.
+    unseen: bool,
+    /// Whether it is an error where anything is.
+    strict: bool,
+}
+
+/// What was written, and the objects that left nothing.
+type Recorded = (Written, Vec<Unseen>);
+
+impl Told<'_> {
+    fn record(
+        &self,
+        capture: &Capture<'_>,
+        write: WriteOptions,
+        file: OutputFile,
+        console: &Console,
+    ) -> Result<Recorded> {
+        let draw = |writer: &mut Writer, told: Progress<'_>| capture.draw(writer, told);
+        self.write(capture.header(), draw, || capture.unseen(), write, file, console)
     }
-    let place = file.path().display().to_string();
-    let mut writer = TraceWriter::new(file, &place, header.clone(), write)?;
-    let progress = console.progress("capturing", "triangles");
-    draw(&mut writer, &mut |done, total| progress.set(done, total))?;
-    drop(progress);
-    let (file, written) = writer.finish()?;
-    file.commit()?;
-    on_interrupt(move || format!("{place} is whole and kept"));
-    if written.rows == 0 {
-        console.warn(&format!("the trace has no fragments: {}", why_empty(header)));
+
+    fn record_by_gpu(
+        &self,
+        capture: &GpuCapture<'_>,
+        write: WriteOptions,
+        file: OutputFile,
+        console: &Console,
+    ) -> Result<Recorded> {
+        let draw = |writer: &mut Writer, told: Progress<'_>| capture.draw(writer, told);
+        self.write(capture.header(), draw, || capture.unseen(), write, file, console)
     }
-    Ok(written)
+
+    fn write(
+        &self,
+        header: &Header,
+        draw: impl FnOnce(&mut Writer, Progress<'_>) -> Result<()>,
+        unseen: impl FnOnce() -> Vec<Unseen>,
+        options: WriteOptions,
+        file: OutputFile,
+        console: &Console,
+    ) -> Result<Recorded> {
+        self.warn(&self.scene.warnings, console)?;
+        let place = file.path().display().to_string();
+        let mut writer = TraceWriter::new(file, &place, header.clone(), options)?;
+        let progress = console.progress("capturing", "triangles");
+        draw(&mut writer, &mut |done, total| progress.set(done, total))?;
+        drop(progress);
+        let (file, written) = writer.finish()?;
+        let unseen = if self.unseen { unseen() } else { Vec::new() };
+        let mut warnings: Vec<String> =
+            unseen.iter().take(MOST_UNSEEN).map(Unseen::to_string).collect();
+        if let Some(more) = unseen.len().checked_sub(MOST_UNSEEN + 1) {
+            warnings.push(format!(
+                "nor was one of {} more objects: --json lists them all",
+                grouped(more as u64 + 1)
+            ));
+        }
+        if written.rows == 0 {
+            warnings.push(format!("the trace has no fragments: {}", why_empty(header)));
+        }
+        self.warn(&warnings, console)?;
+        file.commit()?;
+        on_interrupt(move || format!("{place} is whole and kept"));
+        Ok((written, unseen))
+    }
+
+    /// Tells warnings.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] where there are any and none may be.
+    fn warn(&self, warnings: &[String], console: &Console) -> Result<()> {
+        warnings.iter().for_each(|warning| console.warn(warning));
+        let Some(first) = warnings.first().filter(|_| self.strict) else { return Ok(()) };
+        let what = match warnings.len() {
+            1 => format!("there is a warning, and none may be ({first})"),
+            n => format!("there are {n} warnings, and none may be (the first: {first})"),
+        };
+        let hint = "nothing is written: mend the scene, or leave --strict out";
+        Err(Error::unsupported(&self.scene.source, what, hint))
+    }
 }
 
 /// Where the GPU's rasteriser and ours differ.

@@ -9,12 +9,14 @@ pub struct TextureUse {
     pub texture: usize,
     /// From the mesh's texture coordinates to the texture's.
     pub transform: Affine2,
+    /// Which of the mesh's two sets of texture coordinates: 0 or 1.
+    pub set: usize,
 }
 
 impl TextureUse {
-    /// The texture with the mesh's own coordinates.
+    /// The texture with the mesh's first coordinates as they are.
     pub fn plain(texture: usize) -> Self {
-        TextureUse { texture, transform: Affine2::IDENTITY }
+        TextureUse { texture, transform: Affine2::IDENTITY, set: 0 }
     }
 }
 
@@ -50,6 +52,8 @@ pub struct Material {
     /// `transmission · mean(b)`, so that clear glass nearly vanishes and tinted
     /// glass keeps what its tint absorbs.
     pub transmission: f32,
+    /// A texture whose red channel is multiplied into `transmission`.
+    pub transmission_texture: Option<TextureUse>,
     /// Whether its back is drawn too.
     pub double_sided: bool,
     /// Light of its own, linear.
@@ -70,6 +74,7 @@ impl Default for Material {
             alpha_texture: None,
             alpha_mode: AlphaMode::Opaque,
             transmission: 0.0,
+            transmission_texture: None,
             double_sided: true,
             emissive: Vec3::ZERO,
             emissive_texture: None,

@@ -10,6 +10,7 @@ mod file;
 mod gltf_file;
 mod material;
 mod obj_file;
+mod sampling;
 mod source;
 mod splat_file;
 mod sprite;
@@ -24,7 +25,8 @@ use std::path::{Path, PathBuf};
 use glam::{DAffine3, DVec3, Mat3, Vec2, Vec3, Vec4};
 
 pub use material::{AlphaMode, Material, TextureUse};
-pub use texture::{Texture, Wrap};
+pub use sampling::{Filter, Sampling, Wrap};
+pub use texture::Texture;
 
 use crate::error::{Error, Result};
 use crate::scene::source::{BUILTIN, ending, no_builtin, no_scene};
@@ -129,6 +131,8 @@ pub struct Mesh {
     pub normals: Vec<Vec3>,
     /// Texture coordinates, (0, 0) at the texture's top left.
     pub uvs: Vec<Vec2>,
+    /// A second set of texture coordinates.
+    pub more_uvs: Vec<Vec2>,
     /// Linear colours and alphas, multiplied into the material's.
     pub colours: Vec<Vec4>,
     /// Vertex numbers, three a triangle, in API order.
@@ -288,8 +292,17 @@ impl Scene {
             material.base = Vec3::ONE.extend(material.base.w);
             material.emissive = Vec3::ZERO;
         }
-        for texture in &mut self.textures {
-            texture.whiten();
+        let materials = self.materials.iter();
+        let data: Vec<usize> = materials
+            .flat_map(|m| [m.alpha_texture, m.transmission_texture])
+            .flatten()
+            .map(|used| used.texture)
+            .collect();
+        for (i, texture) in self.textures.iter_mut().enumerate() {
+            // What is no colour stays what it is.
+            if !data.contains(&i) {
+                texture.whiten();
+            }
         }
         for shape in &mut self.shapes {
             let colours = match shape {
@@ -319,7 +332,15 @@ impl Scene {
         }
         if self.triangle_count() == 0 {
             let hint = "give a scene with at least one triangle";
-            return Err(Error::invalid(source, "the scene has no triangles", hint));
+            // What was left out may be all there is.
+            let what = match &self.warnings[..] {
+                [] => "the scene has no triangles".to_string(),
+                all => {
+                    let few = all[..all.len().min(3)].join("; ");
+                    format!("the scene has no triangles ({few})")
+                }
+            };
+            return Err(Error::invalid(source, what, hint));
         }
         let flat = self.flat_triangles();
         if flat == self.triangle_count() {
@@ -383,6 +404,7 @@ fn check_mesh(mesh: &Mesh, place: &str) -> Result<()> {
     for (name, length) in [
         ("normals", mesh.normals.len()),
         ("texture coordinates", mesh.uvs.len()),
+        ("second texture coordinates", mesh.more_uvs.len()),
         ("colours", mesh.colours.len()),
     ] {
         if length != 0 && length != count {
@@ -393,7 +415,7 @@ fn check_mesh(mesh: &Mesh, place: &str) -> Result<()> {
             ));
         }
     }
-    let finite = mesh.uvs.iter().all(|v| v.is_finite())
+    let finite = mesh.uvs.iter().chain(&mesh.more_uvs).all(|v| v.is_finite())
         && mesh.normals.iter().all(|v| v.is_finite())
         && mesh.colours.iter().all(|v| v.is_finite());
     if !finite {
@@ -403,14 +425,34 @@ fn check_mesh(mesh: &Mesh, place: &str) -> Result<()> {
     Ok(())
 }
 
+/// How a scene is loaded.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct LoadOptions {
+    /// Which grid of a volume to draw; where none is named, its densities.
+    pub grid: Option<String>,
+}
+
+/// Loads the scene that `source` names, as [`load_with`] does without options.
+///
+/// # Errors
+/// As [`load_with`].
+pub fn load(source: &str) -> Result<Scene> {
+    load_with(source, &LoadOptions::default())
+}
+
 /// Loads the scene that `source` names: `builtin:NAME[:key=value,…]`, or a file
 /// whose ending says its format.
 ///
 /// # Errors
-/// [`Error::Config`] for an unknown built-in or ending, [`Error::Io`] where the
-/// file cannot be read, [`Error::Invalid`] where it is damaged or holds nothing
-/// to draw.
-pub fn load(source: &str) -> Result<Scene> {
+/// [`Error::Config`] for an unknown built-in or ending, or a grid that is not there,
+/// [`Error::Io`] where the file cannot be read, [`Error::Invalid`] where it is damaged or
+/// holds nothing to draw.
+pub fn load_with(source: &str, options: &LoadOptions) -> Result<Scene> {
+    let kind = path_of(source).map(ending);
+    if options.grid.is_some() && kind.as_deref() != Some("vdb") {
+        let what = format_args!("'{source}' has no grids to choose from");
+        return Err(Error::config(what, "leave --grid out, or give a .vdb file"));
+    }
     let mut scene = match source.strip_prefix(BUILTIN) {
         Some(spec) => builtin::build(spec).map_err(|e| no_builtin(source, e))?,
         None => {
@@ -418,7 +460,7 @@ pub fn load(source: &str) -> Result<Scene> {
             match ending(path).as_str() {
                 "obj" => obj_file::load(path)?,
                 "gltf" | "glb" => gltf_file::load(path)?,
-                "vdb" => vdb_file::load(path)?,
+                "vdb" => vdb_file::load(path, options.grid.as_deref())?,
                 "ply" => splat_file::load(path)?,
                 "tfx" => tfx_file::load(path)?,
                 _ => return Err(no_scene(source)),

@@ -8,6 +8,7 @@ use image::{DynamicImage, ImageDecoder, ImageReader, Limits};
 use crate::error::{Error, Result};
 use crate::picture::{can_hold, srgb};
 use crate::scene::file;
+use crate::scene::sampling::{Filter, Sampling, Wrap};
 
 /// The largest side of a texture.
 const MAX_SIDE: u32 = 16384;
@@ -24,18 +25,20 @@ pub(super) enum Encoding {
     Srgb,
     /// Data, such as opacity.
     Linear,
+    /// Colours as sRGB, which have no alpha, whatever the file has for one.
+    OpaqueSrgb,
+    /// Data without an alpha.
+    OpaqueLinear,
 }
 
-/// What lies beyond a texture's edge.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
-pub enum Wrap {
-    /// The texture again.
-    #[default]
-    Repeat,
-    /// The texture mirrored.
-    Mirror,
-    /// Its last texel.
-    Clamp,
+impl Encoding {
+    fn is_srgb(self) -> bool {
+        matches!(self, Encoding::Srgb | Encoding::OpaqueSrgb)
+    }
+
+    fn is_opaque(self) -> bool {
+        matches!(self, Encoding::OpaqueSrgb | Encoding::OpaqueLinear)
+    }
 }
 
 /// A texture: linear colours multiplied by alpha, in 16 bits a channel, so that
@@ -43,7 +46,7 @@ pub enum Wrap {
 #[derive(Clone)]
 pub struct Texture {
     levels: Vec<Level>,
-    wrap: [Wrap; 2],
+    sampling: Sampling,
     has_alpha: bool,
 }
 
@@ -84,14 +87,19 @@ impl Texture {
         while let Some(next) = levels.last().and_then(Level::halved) {
             levels.push(next);
         }
-        Texture { levels, wrap: [Wrap::Repeat; 2], has_alpha }
+        Texture { levels, sampling: Sampling::default(), has_alpha }
     }
 
     /// The same texture with other rules beyond its edges, horizontally and
     /// vertically.
     pub fn wrapped(mut self, wrap: [Wrap; 2]) -> Self {
-        self.wrap = wrap;
+        self.sampling.wrap = wrap;
         self
+    }
+
+    /// The same texture, sampled in another way.
+    pub fn sampled(self, sampling: Sampling) -> Self {
+        Texture { sampling, ..self }
     }
 
     /// Decodes a PNG or JPEG; colours are taken as sRGB. `place` names it in errors.
@@ -120,7 +128,11 @@ impl Texture {
         Self::decode_as(&file::read(path)?, &path.display().to_string(), encoding)
     }
 
-    fn decode_as(bytes: &[u8], place: &str, encoding: Encoding) -> Result<Self> {
+    /// As [`Texture::decode`], with numbers that mean what `encoding` says.
+    ///
+    /// # Errors
+    /// As [`Texture::decode`].
+    pub(super) fn decode_as(bytes: &[u8], place: &str, encoding: Encoding) -> Result<Self> {
         let bad = |e: &dyn std::fmt::Display| {
             Error::invalid(place, format_args!("the texture cannot be decoded ({e})"), "replace it")
         };
@@ -155,17 +167,15 @@ impl Texture {
     fn from_image(image: DynamicImage, encoding: Encoding) -> Self {
         let (width, height) = (image.width(), image.height());
         // Decodes a channel that is not alpha.
-        let decode = |v: f64| match encoding {
-            Encoding::Srgb => srgb::decode(v) as f32,
-            Encoding::Linear => v as f32,
-        };
+        let decode = |v: f64| if encoding.is_srgb() { srgb::decode(v) as f32 } else { v as f32 };
+        let alpha = |v: f32| if encoding.is_opaque() { 1.0 } else { v };
         if image.color().bytes_per_pixel() / image.color().channel_count() > 1 {
             let table: Vec<f32> = (0..=65535).map(|v| decode(f64::from(v) / 65535.0)).collect();
             let rgba = image.into_rgba16();
             return Texture::from_fn(width, height, |x, y| {
                 let [r, g, b, a] = rgba.get_pixel(x, y).0;
                 let [r, g, b] = [r, g, b].map(|v| table[usize::from(v)]);
-                Vec4::new(r, g, b, f32::from(a) / 65535.0)
+                Vec4::new(r, g, b, alpha(f32::from(a) / 65535.0))
             });
         }
         let table: Vec<f32> = (0..=255).map(|v| decode(f64::from(v) / 255.0)).collect();
@@ -173,7 +183,7 @@ impl Texture {
         Texture::from_fn(width, height, |x, y| {
             let [r, g, b, a] = rgba.get_pixel(x, y).0;
             let [r, g, b] = [r, g, b].map(|v| table[usize::from(v)]);
-            Vec4::new(r, g, b, f32::from(a) / 255.0)
+            Vec4::new(r, g, b, alpha(f32::from(a) / 255.0))
         })
     }
 
@@ -200,63 +210,35 @@ impl Texture {
         self.has_alpha
     }
 
-    /// The texture's linear colour and alpha (not multiplied) at `uv`, filtered
-    /// linearly in both directions and between mip levels. `dx` and `dy` are the
-    /// changes of `uv` over one pixel to the right and downwards.
+    /// The texture's linear colour and alpha (not multiplied) at `uv`, filtered as its
+    /// sampling says. `dx` and `dy` are the changes of `uv` over one pixel to the right and
+    /// downwards.
     pub fn sample(&self, uv: Vec2, dx: Vec2, dy: Vec2) -> Vec4 {
         let size = Vec2::new(self.width() as f32, self.height() as f32);
         // The longer of the pixel's two sides in texels: OpenGL 4.6, section 8.14.
         let footprint = (dx * size).length_squared().max((dy * size).length_squared());
+        let texels = if footprint > 1.0 { 0.5 * libm::log2f(footprint) } else { 0.0 };
         let top = self.levels.len() - 1;
-        let level =
-            if footprint > 1.0 { (0.5 * libm::log2f(footprint)).min(top as f32) } else { 0.0 };
-        let (fine, blend) = (level as usize, level - (level as usize) as f32);
-        let mut colour = self.bilinear(fine, uv);
+        let (filter, fine, blend) = self.sampling.choose(texels, top);
+        let mut colour = self.filtered(filter, fine, uv);
         if blend > 0.0 && fine < top {
-            colour = colour.lerp(self.bilinear(fine + 1, uv), blend);
+            colour = colour.lerp(self.filtered(filter, fine + 1, uv), blend);
         }
         let alpha = colour.w;
         if alpha > 0.0 { (colour.truncate() / alpha).extend(alpha) } else { Vec4::ZERO }
     }
 
-    fn bilinear(&self, level: usize, uv: Vec2) -> Vec4 {
-        let level = &self.levels[level];
-        let (x0, x1, fx) = taps(uv.x, level.width, self.wrap[0]);
-        let (y0, y1, fy) = taps(uv.y, level.height, self.wrap[1]);
+    fn filtered(&self, filter: Filter, level: usize, uv: Vec2) -> Vec4 {
+        let (level, wrap) = (&self.levels[level], self.sampling.wrap);
+        let (x0, x1, fx) = filter.taps(uv.x, level.width, wrap[0]);
+        let (y0, y1, fy) = filter.taps(uv.y, level.height, wrap[1]);
+        if filter == Filter::Nearest {
+            return level.texel(x0, y0);
+        }
         let top = level.texel(x0, y0).lerp(level.texel(x1, y0), fx);
         let bottom = level.texel(x0, y1).lerp(level.texel(x1, y1), fx);
         top.lerp(bottom, fy)
     }
-}
-
-/// The two texels around a coordinate and the weight of the second.
-fn taps(coordinate: f32, size: u32, wrap: Wrap) -> (u32, u32, f32) {
-    let period = match wrap {
-        Wrap::Repeat | Wrap::Clamp => size as f32,
-        Wrap::Mirror => 2.0 * size as f32,
-    };
-    let mut at = coordinate * size as f32;
-    if wrap == Wrap::Clamp {
-        at = at.clamp(0.0, period);
-    } else {
-        // Keeps large coordinates of tiled textures precise.
-        at -= period * (at / period).floor();
-    }
-    let at = at - 0.5;
-    let low = at.floor();
-    let index = |i: f32| {
-        let (i, n) = (i as i64, i64::from(size));
-        let i = match wrap {
-            Wrap::Repeat => i.rem_euclid(n),
-            Wrap::Clamp => i.clamp(0, n - 1),
-            Wrap::Mirror => {
-                let i = i.rem_euclid(2 * n);
-                if i < n { i } else { 2 * n - 1 - i }
-            }
-        };
-        i as u32
-    };
-    (index(low), index(low + 1.0), at - low)
 }
 
 impl Level {
@@ -293,6 +275,8 @@ impl Level {
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
+
     use super::*;
 
     fn checker() -> Texture {
@@ -331,11 +315,29 @@ mod tests {
     }
 
     #[test]
-    fn mirror_and_clamp() {
-        assert_eq!(taps(-0.125, 4, Wrap::Clamp).0, 0);
-        assert_eq!(taps(1.2, 4, Wrap::Clamp).1, 3);
-        assert_eq!(taps(1.125, 4, Wrap::Mirror).0, 3);
-        assert_eq!(taps(-0.125, 4, Wrap::Mirror).0, 0);
+    fn nearest_texels_are_not_mixed() {
+        let sampling =
+            Sampling { magnify: Filter::Nearest, minify: Filter::Nearest, ..Sampling::default() };
+        let texture = checker().sampled(Sampling { levels: None, ..sampling });
+        let at = |x: f32, dx: f32| {
+            texture.sample(Vec2::new(x / 4.0, 0.125), Vec2::new(dx, 0.0), Vec2::ZERO).x
+        };
+        assert_eq!([at(0.01, 0.0), at(0.99, 0.0), at(1.01, 0.0)], [1.0, 1.0, 0.0]);
+        // From far away too, where there are no mip levels.
+        assert_eq!([at(0.99, 1.0), at(1.01, 1.0)], [1.0, 0.0]);
+    }
+
+    #[test]
+    fn opaque_textures_keep_the_colours_of_transparent_texels() {
+        let half = image::RgbaImage::from_fn(2, 1, |x, _| image::Rgba([200, 100, 50, x as u8]));
+        let texture = |encoding| Texture::from_image(half.clone().into(), encoding);
+        let opaque = texture(Encoding::OpaqueSrgb);
+        let middle = opaque.sample(Vec2::splat(0.5), Vec2::ZERO, Vec2::ZERO);
+        let wanted = [200, 100, 50].map(|v| srgb::decode(f64::from(v) / 255.0) as f32);
+        assert!((middle.truncate() - Vec3::from(wanted)).abs().max_element() < 1e-4, "{middle}");
+        assert!(middle.w == 1.0 && !opaque.has_alpha() && texture(Encoding::Srgb).has_alpha());
+        let data = texture(Encoding::OpaqueLinear).sample(Vec2::ZERO, Vec2::ZERO, Vec2::ZERO);
+        assert!((data.x - 200.0 / 255.0).abs() < 1e-4, "{data}");
     }
 
     #[test]

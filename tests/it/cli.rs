@@ -3,6 +3,7 @@
 mod gpu;
 mod outputs;
 mod study;
+mod told;
 mod traps;
 mod words;
 

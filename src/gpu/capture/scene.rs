@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::capture::{Capture, CaptureOptions, Drawing, PatternKind};
+use crate::capture::{Capture, CaptureOptions, Drawing, PatternKind, Unseen};
 use crate::error::{Error, Result};
 use crate::gpu::capture::check::CrossCheck;
 use crate::gpu::capture::fragments::RawFragment;
@@ -90,8 +90,13 @@ impl<'a> GpuCapture<'a> {
                 raw.iter().filter_map(shade).collect()
             };
             let shaded: Vec<Vec<Fragment>> = triangles.par_iter().map(shade).collect();
-            shaded.iter().flatten().try_for_each(|fragment| writer.push(fragment))
+            shaded.iter().flatten().try_for_each(|fragment| self.capture.write(writer, fragment))
         })
+    }
+
+    /// As [`Capture::unseen`].
+    pub fn unseen(&self) -> Vec<Unseen> {
+        self.capture.unseen()
     }
 
     /// Draws the scene into a trace in memory.

@@ -1,140 +1,190 @@
-//! The materials and textures of glTF files.
-
-use std::borrow::Cow;
+//! The materials of glTF files.
 
 use glam::{Affine2, Vec2, Vec3, Vec4};
 
 use super::Loader;
+use super::document::shortened;
+use super::json::{self, TextureInfo};
+use super::told::Matter;
 use crate::error::{Result, one_line};
-use crate::scene::{AlphaMode, Material, Texture, TextureUse, Wrap};
+use crate::scene::texture::Encoding;
+use crate::scene::{AlphaMode, Material, TextureUse};
+
+/// How many sets of texture coordinates a material can use.
+pub(super) const SETS: usize = 2;
+
+/// A material of the file, as the scene has it.
+#[derive(Clone, Debug)]
+pub(super) struct Made {
+    /// Which of the scene's materials.
+    pub material: usize,
+    /// The sets of texture coordinates that it uses, by the file's numbers; the first one
+    /// where it has no texture, for one that may be put on it.
+    pub sets: Vec<u32>,
+    /// Whether it has a texture.
+    pub textured: bool,
+    /// What of it is not drawn.
+    pub matters: Vec<Matter>,
+}
+
+/// What a material's textures need while they are gathered.
+#[derive(Default)]
+struct Gathered {
+    sets: Vec<u32>,
+    matters: Vec<Matter>,
+}
 
 impl Loader<'_> {
-    pub(super) fn material(&mut self, material: &gltf::Material<'_>) -> Result<usize> {
-        if let Some(index) = self.materials.get(&material.index()) {
-            return Ok(*index);
+    /// The material of that number; the default one where a primitive names none.
+    pub(super) fn material(&mut self, index: Option<usize>, namer: &str) -> Result<Made> {
+        if let Some(made) = self.materials.get(&index) {
+            return Ok(made.clone());
         }
-        let pbr = material.pbr_metallic_roughness();
-        let mut texture_use = |info: Option<gltf::texture::Info<'_>>| {
-            info.map(|info| self.texture_use(&info)).transpose().map(Option::flatten)
+        let default = json::Material::default();
+        let (said, part) = match index {
+            None => (&default, "the default material".to_string()),
+            Some(i) => match self.root.materials.get(i) {
+                Some(said) => (said, format!("material {i}")),
+                None => {
+                    let what = format!("it names material {i}, which is not there");
+                    return Err(self.bad(namer, what, "export the file again"));
+                }
+            },
         };
-        let base_texture = texture_use(pbr.base_color_texture())?;
-        let emissive_texture = texture_use(material.emissive_texture())?;
-        if let [Some(base), Some(emissive)] = texture_sets(material)
-            && base != emissive
-        {
-            let name = one_line(material.name().unwrap_or(""));
-            self.scene.warnings.push(format!(
-                "{}, material '{name}': its emissive texture wants texture coordinates \
-                 {emissive}, and is drawn with its base texture's, {base}",
-                self.place
-            ));
-        }
-        let emissive = if material.emissive_texture().is_some() && emissive_texture.is_none() {
+        let made = self.make(said, &part)?;
+        self.materials.insert(index, made.clone());
+        Ok(made)
+    }
+
+    fn make(&mut self, said: &json::Material, part: &str) -> Result<Made> {
+        let cutoff = said.alpha_cutoff.unwrap_or(0.5);
+        let alpha_mode = match said.alpha_mode.as_deref() {
+            None | Some("OPAQUE") => AlphaMode::Opaque,
+            Some("MASK") => AlphaMode::Mask { cutoff },
+            Some("BLEND") => AlphaMode::Blend,
+            Some(other) => {
+                let what =
+                    format!("its alphaMode '{}' is not one that glTF allows", shortened(other));
+                return Err(self.bad(part, what, "export the file again"));
+            }
+        };
+        let extensions = &said.extensions;
+        let transmission: Option<json::Transmission> =
+            self.said(extensions, "KHR_materials_transmission", part)?;
+        let strength: Option<json::EmissiveStrength> =
+            self.said(extensions, "KHR_materials_emissive_strength", part)?;
+        let specular: Option<json::SpecularGlossiness> =
+            self.said(extensions, "KHR_materials_pbrSpecularGlossiness", part)?;
+        let unlit = extensions.has("KHR_materials_unlit");
+
+        let mut gathered =
+            Gathered { matters: self.told.extensions(extensions.names()), sets: Vec::new() };
+        self.tell_unread(said, &mut gathered);
+        // The older extension says in its own way what is in the core now.
+        let pbr = &said.pbr_metallic_roughness;
+        let (factor, base_info) = match &specular {
+            Some(specular) => (specular.diffuse_factor, &specular.diffuse_texture),
+            None => (pbr.base_color_factor, &pbr.base_color_texture),
+        };
+        // An opaque surface's texture has no alpha, also where it is filtered.
+        let encoding = match alpha_mode {
+            AlphaMode::Opaque => Encoding::OpaqueSrgb,
+            AlphaMode::Mask { .. } | AlphaMode::Blend => Encoding::Srgb,
+        };
+        let base_texture = self.texture_use(base_info.as_ref(), encoding, &mut gathered, part)?;
+        let transmission_info = transmission.as_ref().and_then(|t| t.transmission_texture.as_ref());
+        let transmission_texture =
+            self.texture_use(transmission_info, Encoding::OpaqueLinear, &mut gathered, part)?;
+        // What is unlit shows its colour alone.
+        let emissive_info = said.emissive_texture.as_ref().filter(|_| !unlit);
+        let emissive_texture =
+            self.texture_use(emissive_info, Encoding::OpaqueSrgb, &mut gathered, part)?;
+        let emissive = if unlit || emissive_info.is_some() && emissive_texture.is_none() {
             // The factor alone would flood the surface with the light that the
             // missing texture was to confine.
             Vec3::ZERO
         } else {
-            Vec3::from(material.emissive_factor())
+            let strength = strength.and_then(|s| s.emissive_strength).unwrap_or(1.0);
+            Vec3::from(said.emissive_factor) * strength
         };
-        let made = Material {
-            name: one_line(material.name().unwrap_or("")),
-            base: Vec4::from(pbr.base_color_factor()),
+        self.scene.materials.push(Material {
+            name: one_line(said.name.as_deref().unwrap_or("")),
+            base: Vec4::from(factor.unwrap_or([1.0; 4])),
             base_texture,
             alpha_texture: None,
-            alpha_mode: match material.alpha_mode() {
-                gltf::material::AlphaMode::Opaque => AlphaMode::Opaque,
-                gltf::material::AlphaMode::Mask => {
-                    AlphaMode::Mask { cutoff: material.alpha_cutoff().unwrap_or(0.5) }
-                }
-                gltf::material::AlphaMode::Blend => AlphaMode::Blend,
-            },
-            transmission: material.transmission().map_or(0.0, |t| t.transmission_factor()),
-            double_sided: material.double_sided(),
+            alpha_mode,
+            transmission: transmission.map_or(0.0, |t| t.transmission_factor),
+            transmission_texture,
+            double_sided: said.double_sided,
             emissive,
             emissive_texture,
-            unlit: material.unlit(),
-        };
-        self.scene.materials.push(made);
-        let index = self.scene.materials.len() - 1;
-        self.materials.insert(material.index(), index);
-        Ok(index)
+            unlit,
+        });
+        let Gathered { mut sets, matters } = gathered;
+        let textured = !sets.is_empty();
+        if !textured {
+            sets.push(0);
+        }
+        Ok(Made { material: self.scene.materials.len() - 1, sets, textured, matters })
     }
 
-    fn texture_use(&mut self, info: &gltf::texture::Info<'_>) -> Result<Option<TextureUse>> {
-        let transform = info.texture_transform().map_or(Affine2::IDENTITY, |t| {
+    /// Tells of the textures that a diffuse surface has no use for.
+    fn tell_unread(&mut self, said: &json::Material, gathered: &mut Gathered) {
+        let unread = [
+            (&said.normal_texture, "normal", "surfaces are shaded by their vertices' normals"),
+            (&said.occlusion_texture, "occlusion", "nothing is darkened by what is near"),
+            (
+                &said.pbr_metallic_roughness.metallic_roughness_texture,
+                "metallicRoughness",
+                "surfaces are diffuse",
+            ),
+        ];
+        for (_, name, instead) in unread.iter().filter(|(info, ..)| info.is_some()) {
+            let what = format_args!("{name} textures are not read: {instead}");
+            gathered.matters.push(self.told.matter(what));
+        }
+    }
+
+    fn texture_use(
+        &mut self,
+        info: Option<&TextureInfo>,
+        encoding: Encoding,
+        gathered: &mut Gathered,
+        part: &str,
+    ) -> Result<Option<TextureUse>> {
+        let Some(info) = info else { return Ok(None) };
+        gathered.matters.extend(self.told.extensions(info.extensions.names()));
+        let transform: Option<json::TextureTransform> =
+            self.said(&info.extensions, "KHR_texture_transform", part)?;
+        let set = transform.as_ref().and_then(|t| t.tex_coord).unwrap_or(info.tex_coord);
+        let transform = transform.map_or(Affine2::IDENTITY, |t| {
             // The extension's own order: scale, then rotate, then move. Its
             // rotation is counter-clockwise with v upwards, ours downwards.
             Affine2::from_scale_angle_translation(
-                Vec2::from(t.scale()),
-                -t.rotation(),
-                Vec2::from(t.offset()),
+                Vec2::from(t.scale.unwrap_or([1.0; 2])),
+                -t.rotation,
+                Vec2::from(t.offset),
             )
         });
-        let texture = self.texture(&info.texture())?;
-        Ok(texture.map(|texture| TextureUse { texture, transform }))
-    }
-
-    /// The scene's texture for a glTF texture; `None`, with a warning, where its
-    /// image is missing.
-    fn texture(&mut self, texture: &gltf::Texture<'_>) -> Result<Option<usize>> {
-        let wrap = |mode| match mode {
-            gltf::texture::WrappingMode::Repeat => Wrap::Repeat,
-            gltf::texture::WrappingMode::MirroredRepeat => Wrap::Mirror,
-            gltf::texture::WrappingMode::ClampToEdge => Wrap::Clamp,
-        };
-        let wrap = [wrap(texture.sampler().wrap_s()), wrap(texture.sampler().wrap_t())];
-        let image = texture.source();
-        let key = (image.index(), wrap);
-        if let Some(index) = self.textures.get(&key) {
-            return Ok(*index);
-        }
-        let part = format!("image {}", image.index());
-        let bytes = self.image(image.index(), &part);
-        let place = format!("{}, {part}", self.place);
-        let index = match bytes
-            .and_then(|bytes| Texture::decode(&bytes, &place))
-            .and_then(|texture| self.scene.add_texture(texture.wrapped(wrap)))
-        {
-            Ok(index) => Some(index),
-            Err(e) => {
-                self.scene.warnings.push(e.to_string());
-                None
+        let (texture, matters) = self.texture(info.index, encoding, part)?;
+        gathered.matters.extend(matters);
+        let Some(texture) = texture else { return Ok(None) };
+        let sets = &mut gathered.sets;
+        let set = match sets.iter().position(|known| *known == set) {
+            Some(known) => known,
+            None if sets.len() < SETS => {
+                sets.push(set);
+                sets.len() - 1
+            }
+            None => {
+                let what = format_args!(
+                    "materials that use more than {SETS} sets of texture coordinates are drawn \
+                     with the first {SETS}"
+                );
+                gathered.matters.push(self.told.matter(what));
+                0
             }
         };
-        self.textures.insert(key, index);
-        Ok(index)
+        Ok(Some(TextureUse { texture, transform, set }))
     }
-
-    /// The bytes of an image. The library's own way to them panics where the file
-    /// says neither a URI nor a view, or a view without the format, which the bytes
-    /// themselves tell.
-    fn image(&self, index: usize, part: &str) -> Result<Cow<'_, [u8]>> {
-        let bad = |what: &str| Err(self.bad(part, what, "export the file again"));
-        let Some(image) = self.document.as_json().images.get(index) else {
-            return bad("it is not there");
-        };
-        let view = image.buffer_view.and_then(|view| self.document.views().nth(view.value()));
-        match (view, &image.uri) {
-            (Some(view), _) => {
-                let buffer = self.buffers.get(view.buffer().index());
-                let range = view.offset()..view.offset().saturating_add(view.length());
-                match buffer.and_then(|b| b.get(range)) {
-                    Some(bytes) => Ok(Cow::Borrowed(bytes)),
-                    None => bad("it reaches beyond its buffer"),
-                }
-            }
-            (None, Some(uri)) => self.resolve(uri, part).map(Cow::Owned),
-            (None, None) => bad("it names neither a file nor a buffer view"),
-        }
-    }
-}
-
-/// The sets of texture coordinates that a material's base texture and emissive
-/// texture want.
-pub(super) fn texture_sets(material: &gltf::Material<'_>) -> [Option<u32>; 2] {
-    let set = |info: gltf::texture::Info<'_>| {
-        info.texture_transform().and_then(|t| t.tex_coord()).unwrap_or(info.tex_coord())
-    };
-    let base = material.pbr_metallic_roughness().base_color_texture();
-    [base.map(set), material.emissive_texture().map(set)]
 }

@@ -49,6 +49,7 @@ pub(super) fn load(path: &Path) -> Result<Scene> {
 fn mesh(read: &tobj::Mesh, material: usize) -> Mesh {
     let triples = |v: &[f32]| v.chunks_exact(3).map(Vec3::from_slice).collect::<Vec<_>>();
     let mut mesh = Mesh {
+        more_uvs: Vec::new(),
         positions: triples(&read.positions),
         normals: triples(&read.normals),
         uvs: read.texcoords.chunks_exact(2).map(Vec2::from_slice).collect(),

@@ -4,7 +4,7 @@
 use glam::{DAffine3, DMat3, DVec3};
 
 use super::packed::Packing;
-use crate::error::{Result, one_line};
+use crate::error::{Error, Result, one_line};
 use crate::scene::bytes::Bytes;
 
 /// The versions of the file format that are read: from the one on that says for
@@ -20,41 +20,81 @@ const DENSITY: &str = "density";
 /// A grid, without its tree.
 pub(super) struct Grid {
     pub name: String,
+    /// What it says of its values: `level set`, `fog volume`, or anything.
+    pub class: String,
     pub packing: Packing,
     /// Whether values are stored as half floats.
     pub half: bool,
     /// From voxels to the scene.
     pub place: DAffine3,
-    /// Where the voxels' values begin and end.
+    /// Where its tree begins, and where its voxels' values begin and end.
+    pub tree: u64,
     pub blocks: u64,
     pub end: u64,
 }
 
+impl Grid {
+    /// Whether it says that it holds distances to a surface.
+    pub fn is_level_set(&self) -> bool {
+        self.class == "level set"
+    }
+}
+
 /// Where a grid is.
-struct Entry {
-    name: String,
-    kind: String,
+pub(super) struct Entry {
+    pub name: String,
+    pub kind: String,
     is_instance: bool,
     grid: u64,
     blocks: u64,
     end: u64,
 }
 
-/// Finds the grid to draw: that of the name `density`, else the first of floats.
-/// After it `bytes` stand at its tree. The second value tells what is left out.
-pub(super) fn find(bytes: &mut Bytes) -> Result<(Grid, Option<String>)> {
-    let entries = entries(bytes)?;
-    let is_float = |e: &&Entry| e.kind.trim_end_matches(HALF) == FLOAT_GRID && !e.is_instance;
-    let of_floats = || entries.iter().filter(is_float);
-    let Some(entry) = of_floats().find(|e| e.name == DENSITY).or_else(|| of_floats().next()) else {
-        let found: Vec<String> =
-            entries.iter().map(|e| format!("'{}' of {}", e.name, e.kind)).collect();
-        let what = format!("it has no grid of {FLOAT_GRID} (it has: {})", found.join(", "));
-        return Err(bytes.unsupported(what, "save the density as a float grid"));
-    };
-    let left_out = (entries.len() > 1)
-        .then(|| format!("of its {} grids only '{}' is drawn", entries.len(), entry.name));
+impl Entry {
+    fn is_float(&self) -> bool {
+        self.kind.trim_end_matches(HALF) == FLOAT_GRID && !self.is_instance
+    }
+}
 
+/// The grids that may be drawn, with their numbers among the entries; the first that holds
+/// densities is to be. They are the one of the name `wanted`, or else all of floats: that of
+/// the name `density`, those that call themselves fog volumes, the others.
+///
+/// # Errors
+/// [`Error::Config`] where there is none of the name wanted, [`Error::Unsupported`] where
+/// there is none of floats.
+pub(super) fn candidates(
+    bytes: &mut Bytes,
+    entries: &[Entry],
+    wanted: Option<&str>,
+) -> Result<Vec<(usize, Result<Grid>)>> {
+    let named = |e: &Entry| wanted.is_none_or(|wanted| e.name == wanted);
+    if let Some(wanted) = wanted
+        && !entries.iter().any(named)
+    {
+        return Err(Error::unknown("grid", wanted, entries.iter().map(|e| e.name.as_str())));
+    }
+    let numbered = entries.iter().enumerate();
+    let mut found: Vec<(usize, Result<Grid>)> = numbered
+        .filter(|(_, entry)| entry.is_float() && named(entry))
+        .map(|(i, entry)| (i, open(bytes, entry)))
+        .collect();
+    if found.is_empty() {
+        let all = entries.iter().filter(|e| named(e));
+        let all: Vec<String> = all.map(|e| format!("'{}' of {}", e.name, e.kind)).collect();
+        let what = format!("it has no grid of {FLOAT_GRID} (it has: {})", all.join(", "));
+        return Err(bytes.unsupported(what, "save the density as a float grid"));
+    }
+    found.sort_by_key(|(i, grid)| match grid {
+        _ if entries[*i].name == DENSITY => 0,
+        Ok(grid) if grid.class == "fog volume" => 1,
+        _ => 2,
+    });
+    Ok(found)
+}
+
+/// Reads what stands before a grid's tree.
+fn open(bytes: &mut Bytes, entry: &Entry) -> Result<Grid> {
     bytes.seek(entry.grid)?;
     let flags = bytes.u32()?;
     let Some(packing) = Packing::from_flags(flags) else {
@@ -62,23 +102,21 @@ pub(super) fn find(bytes: &mut Bytes) -> Result<(Grid, Option<String>)> {
     };
     let metadata = metadata(bytes)?;
     let entry_of = |name: &str| metadata.iter().find(|(n, _)| n == name).map(|(_, value)| *value);
-    if entry_of("class") == Some(b"level set") {
-        let what = format_args!("its grid '{}' is a level set, not a density", entry.name);
-        return Err(bytes.unsupported(what, "convert it to a fog volume"));
-    }
-    let grid = Grid {
+    let class = String::from_utf8_lossy(entry_of("class").unwrap_or(b"")).into_owned();
+    Ok(Grid {
         name: entry.name.clone(),
+        class,
         packing,
         half: entry_of("is_saved_as_half_float").is_some_and(|v| v.iter().any(|b| *b != 0)),
         place: place(bytes)?,
+        tree: bytes.at() as u64,
         blocks: entry.blocks,
         end: entry.end,
-    };
-    Ok((grid, left_out))
+    })
 }
 
-/// Reads the head of the file.
-fn entries(bytes: &mut Bytes) -> Result<Vec<Entry>> {
+/// Reads the head of the file: which grids there are.
+pub(super) fn entries(bytes: &mut Bytes) -> Result<Vec<Entry>> {
     const MAGIC: &[u8] = b" BDV\0\0\0\0";
     /// The length of the file's own identifier.
     const UUID: usize = 36;

@@ -35,23 +35,66 @@ const SIZE: f32 = 1.25;
 /// Voxels below this share of the greatest density are not drawn.
 const LEAST_SHARE: f32 = 0.03;
 
-/// Loads the VDB file at `path`: of its grids that of the name `density`, or else the
-/// first of floats.
-pub(super) fn load(path: &Path) -> Result<Scene> {
+/// Loads the VDB file at `path`: of its grids that of the name `wanted`, or else that of
+/// the name `density`, the first fog volume, or the first of floats. Level sets are passed
+/// over, whether they say that they are some or only hold distances.
+pub(super) fn load(path: &Path, wanted: Option<&str>) -> Result<Scene> {
     let content = file::read(path)?;
     let place = path.display().to_string();
     let mut bytes = Bytes::new(&place, &content);
-    let (grid, left_out) = archive::find(&mut bytes)?;
-    let mut voxels = tree::read(&mut bytes, &grid)?;
+    let entries = archive::entries(&mut bytes)?;
+    let mut level_sets: Vec<usize> = Vec::new();
+    let mut chosen = None;
+    for (number, grid) in archive::candidates(&mut bytes, &entries, wanted)? {
+        let grid = grid?;
+        if chosen.is_some() || grid.is_level_set() {
+            // The others are looked at no further.
+            level_sets.extend(grid.is_level_set().then_some(number));
+            continue;
+        }
+        let values = tree::read(&mut bytes, &grid)?;
+        if values.are_distances && grid.class != "fog volume" {
+            level_sets.push(number);
+        } else {
+            chosen = Some((number, grid, values));
+        }
+    }
+    let Some((number, grid, values)) = chosen else {
+        let names = level_sets.iter().map(|i| format!("'{}'", entries[*i].name));
+        let names = names.collect::<Vec<_>>().join(", ");
+        let what = format!("it holds distances to surfaces (level sets: {names}), no density");
+        return Err(Error::unsupported(&place, what, "convert one to a fog volume"));
+    };
+    let mut voxels = values.voxels;
     let greatest = voxels.iter().map(|v| v.density).fold(0.0, f32::max);
     voxels.retain(|v| v.density >= greatest * LEAST_SHARE);
     if voxels.is_empty() {
         let what = format_args!("its grid '{}' is empty", grid.name);
         return Err(Error::invalid(&place, what, "give one with a density above 0"));
     }
+    let mut left_out: Vec<String> = Vec::new();
+    // Who names one knows what is left out.
+    if entries.len() > 1 && wanted.is_none() {
+        let others = entries.iter().enumerate().filter(|(i, _)| *i != number);
+        let others = others.map(|(i, entry)| match level_sets.contains(&i) {
+            true => format!("'{}', a level set", entry.name),
+            false => format!("'{}' of {}", entry.name, entry.kind),
+        });
+        let others: Vec<String> = others.collect();
+        let (name, others) = (&grid.name, others.join("; "));
+        left_out
+            .push(format!("of its {} grids only '{name}' is drawn, not {others}", entries.len()));
+    }
+    if values.negative > 0 {
+        let (name, count) = (&grid.name, values.negative);
+        left_out.push(format!("{count} voxels of its grid '{name}' are negative and draw nothing"));
+    }
 
     let mut scene = Scene {
-        source: file_name(path),
+        source: match wanted {
+            Some(grid) => format!("{}, grid {grid}", file_name(path)),
+            None => file_name(path),
+        },
         files: vec![path.to_path_buf()],
         warnings: left_out.into_iter().map(|what| format!("{place}: {what}")).collect(),
         view: View { pitch: 15.0, background: [0.02, 0.035, 0.06], ..View::default() },

@@ -27,9 +27,29 @@ pub(super) struct Voxel {
     pub density: f32,
 }
 
-/// Reads the active voxels, from where `bytes` stand.
-pub(super) fn read(bytes: &mut Bytes, grid: &Grid) -> Result<Vec<Voxel>> {
-    let mut reader = Reader { bytes, grid, voxels: Vec::new(), leaves: Vec::new() };
+/// What a grid's tree holds.
+pub(super) struct Values {
+    /// The active voxels of more than nothing.
+    pub voxels: Vec<Voxel>,
+    /// How many active ones are below nothing.
+    pub negative: u64,
+    /// Whether all active values look like distances to a surface: of both signs, and not
+    /// beyond what is everywhere else, which is not 0.
+    pub are_distances: bool,
+}
+
+/// Reads a grid's values.
+pub(super) fn read(bytes: &mut Bytes, grid: &Grid) -> Result<Values> {
+    bytes.seek(grid.tree)?;
+    let mut reader = Reader {
+        bytes,
+        grid,
+        voxels: Vec::new(),
+        leaves: Vec::new(),
+        background: 0.0,
+        range: [f32::INFINITY, f32::NEG_INFINITY],
+        negative: 0,
+    };
     reader.root()?;
     if reader.bytes.at() as u64 != grid.blocks {
         let (at, claimed) = (reader.bytes.at(), grid.blocks);
@@ -44,7 +64,12 @@ pub(super) fn read(bytes: &mut Bytes, grid: &Grid) -> Result<Vec<Voxel>> {
         let what = format_args!("its voxels end at byte {at}, and {claimed} was announced");
         return Err(reader.bytes.bad(what));
     }
-    Ok(reader.voxels)
+    let [least, most] = reader.range;
+    // A little more, for what rounding does to a half float.
+    let beyond = reader.background * 1.001;
+    let are_distances =
+        reader.background > 0.0 && least < 0.0 && most > 0.0 && most <= beyond && -least <= beyond;
+    Ok(Values { voxels: reader.voxels, negative: reader.negative, are_distances })
 }
 
 /// A corner of a node, in voxels. Nodes of the file's own making may lie anywhere,
@@ -56,6 +81,11 @@ struct Reader<'r, 'a> {
     grid: &'r Grid,
     voxels: Vec<Voxel>,
     leaves: Vec<Corner>,
+    /// The value of all that is not stored.
+    background: f32,
+    /// The least and the greatest active value.
+    range: [f32; 2],
+    negative: u64,
 }
 
 impl<'a> Reader<'_, 'a> {
@@ -65,7 +95,7 @@ impl<'a> Reader<'_, 'a> {
             let what = format_args!("its tree has {buffers} buffers, and 1 is read");
             return Err(self.bytes.unsupported(what, "save the grid alone"));
         }
-        let _background = self.bytes.f32()?;
+        self.background = self.bytes.f32()?;
         let (tiles, children) = (self.bytes.u32()?, self.bytes.u32()?);
         for _ in 0..tiles {
             let corner = self.corner()?;
@@ -126,7 +156,10 @@ impl<'a> Reader<'_, 'a> {
 
     /// A cube of voxels of one density, with sides of 2^`size`.
     fn tile(&mut self, corner: Corner, size: u32, density: f32) -> Result<()> {
-        let count = if density <= 0.0 { 0 } else { 1_usize << (3 * size) };
+        if density <= 0.0 {
+            return self.nothing(density, 1 << (3 * size));
+        }
+        let count = 1_usize << (3 * size);
         if self.voxels.len() + count > MAX_VOXELS {
             return Err(self.too_many());
         }
@@ -138,8 +171,9 @@ impl<'a> Reader<'_, 'a> {
             return Err(self.bytes.bad(format_args!("its voxel {at:?} has the density {density}")));
         }
         if density <= 0.0 {
-            return Ok(());
+            return self.nothing(density, 1);
         }
+        self.range = [self.range[0].min(density), self.range[1].max(density)];
         if self.voxels.len() == MAX_VOXELS {
             return Err(self.too_many());
         }
@@ -147,6 +181,15 @@ impl<'a> Reader<'_, 'a> {
             return Err(self.bytes.bad(format_args!("its voxel {at:?} lies too far away")));
         };
         self.voxels.push(Voxel { at: IVec3::new(x, y, z), density });
+        Ok(())
+    }
+
+    /// Active voxels that draw nothing.
+    fn nothing(&mut self, density: f32, count: u64) -> Result<()> {
+        self.range = [self.range[0].min(density), self.range[1].max(density)];
+        if density < 0.0 {
+            self.negative = self.negative.saturating_add(count);
+        }
         Ok(())
     }
 

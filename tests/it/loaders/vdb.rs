@@ -2,9 +2,9 @@
 
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use screendoor::error::Error;
-use screendoor::scene::{AlphaMode, Scene};
+use screendoor::scene::{AlphaMode, LoadOptions, Scene, load_with};
 
-use super::{folder, load_in, particles};
+use super::{folder, load_in, particles, warned};
 
 /// How a file is written.
 #[derive(Clone)]
@@ -23,6 +23,8 @@ pub struct Written {
     pub tile: Option<f32>,
     /// What each packed block claims for its length.
     pub bomb: Option<i64>,
+    /// The value of all that is not stored.
+    pub background: f32,
 }
 
 impl Default for Written {
@@ -38,6 +40,7 @@ impl Default for Written {
             voxels: vec![([0, 0, 0], 1.0), ([1, 2, 3], 0.5), ([7, 7, 7], 0.001)],
             tile: None,
             bomb: None,
+            background: 0.0,
         }
     }
 }
@@ -139,18 +142,11 @@ impl Written {
 
     /// The file's bytes.
     pub fn bytes(&self) -> Vec<u8> {
-        let mut file = b" BDV\0\0\0\0".to_vec();
-        for word in [self.version, 11, 0] {
-            file.extend(word.to_le_bytes());
-        }
-        file.push(1);
-        file.extend([b'0'; 36]);
-        file.extend(metadata(&[("creator", "string", b"a test".to_vec())]));
-        file.extend(1_u32.to_le_bytes());
-        file.extend([text(self.name), text(self.kind), text("")].concat());
-        let offsets = file.len();
-        let grid = offsets + 24;
+        file(std::slice::from_ref(self))
+    }
 
+    /// What stands before its tree, its tree, and its voxels.
+    fn parts(&self) -> [Vec<u8>; 3] {
         let mut head = self.packing.to_le_bytes().to_vec();
         head.extend(metadata(&[
             ("class", "string", self.class.into()),
@@ -159,8 +155,9 @@ impl Written {
         head.extend(text(self.map.0));
         head.extend(self.map.1.iter().flat_map(|v| v.to_le_bytes()));
 
-        // The tree: one buffer, no background, no tiles, one child at the origin.
-        let mut tree = [1_u32, 0, 0, 1, 0, 0].map(u32::to_le_bytes).concat();
+        // The tree: one buffer, no tiles, one child at the origin.
+        let background = self.background.to_bits();
+        let mut tree = [1_u32, background, 0, 1, 0, 0].map(u32::to_le_bytes).concat();
         tree.extend((-4096_i32).to_le_bytes());
         // z from −4096 on: −8 lies in child 31 of 128 along z, and there in leaf 15.
         tree.extend(mask(32768, &[31]));
@@ -185,17 +182,36 @@ impl Written {
         let mut blocks = mask(512, &active);
         blocks.extend(self.values(&densities, 512, &active));
 
-        for at in
-            [grid, grid + head.len() + tree.len(), grid + head.len() + tree.len() + blocks.len()]
-        {
-            file.extend((at as u64).to_le_bytes());
-        }
-        [file, head, tree, blocks].concat()
+        [head, tree, blocks]
     }
 
     fn load(&self) -> Result<Scene, Error> {
         load_in(folder(&[("a.vdb", &self.bytes())]).path(), "a.vdb")
     }
+}
+
+/// A file of these grids, of the version of the first.
+fn file(grids: &[Written]) -> Vec<u8> {
+    let mut file = b" BDV\0\0\0\0".to_vec();
+    for word in [grids[0].version, 11, 0] {
+        file.extend(word.to_le_bytes());
+    }
+    file.push(1);
+    file.extend([b'0'; 36]);
+    file.extend(metadata(&[("creator", "string", b"a test".to_vec())]));
+    file.extend((grids.len() as u32).to_le_bytes());
+    for grid in grids {
+        file.extend([text(grid.name), text(grid.kind), text("")].concat());
+        let parts = grid.parts();
+        let mut at = file.len() + 24;
+        let mut ends = Vec::new();
+        for length in [0, parts[0].len() + parts[1].len(), parts[2].len()] {
+            at += length;
+            ends.extend((at as u64).to_le_bytes());
+        }
+        file.extend([ends, parts.concat()].concat());
+    }
+    file
 }
 
 /// The voxels that the particles stand in.
@@ -297,4 +313,67 @@ fn what_is_no_density_is_refused() {
     let scene = older.load().unwrap();
     assert_eq!(scene.objects[0].name, "fog");
     assert_eq!(scene.warnings, [""; 0]);
+}
+
+/// A level set as it says itself, and one that does not.
+fn level_sets() -> [Written; 2] {
+    let voxels = vec![([0, 0, 0], -1.5), ([0, 0, 1], 0.5), ([0, 0, 2], 2.5)];
+    let named = Written { name: "sdf", class: "level set", ..Written::default() };
+    let unnamed = Written {
+        name: "surface",
+        class: "unknown",
+        background: 3.0,
+        voxels,
+        ..Written::default()
+    };
+    [named, unnamed]
+}
+
+#[test]
+fn of_several_grids_the_fog_is_drawn_or_the_one_that_is_named() {
+    let [named, unnamed] = level_sets();
+    let vectors = Written { name: "vel", kind: "Tree_vec3s_5_4_3", ..Written::default() };
+    let heat = Written { name: "heat", class: "unknown", ..Written::default() };
+    let smoke = Written { name: "smoke", voxels: vec![([4, 0, 0], 2.0)], ..Written::default() };
+    let bytes = file(&[named.clone(), unnamed.clone(), vectors, heat, smoke]);
+    let folder = folder(&[("a.vdb", &bytes)]);
+    let path = folder.path().join("a.vdb").display().to_string();
+    let load = |grid: &str| {
+        let grid = (!grid.is_empty()).then(|| grid.to_string());
+        load_with(&path, &LoadOptions { grid })
+    };
+    let scene = load("").unwrap();
+    assert_eq!(voxels(&scene), [Vec3::new(12.0, 0.0, -8.0)]);
+    warned(
+        &scene,
+        1,
+        &[
+            "of its 5 grids only 'smoke' is drawn, not 'sdf', a level set; 'surface' of",
+            "; 'vel' of Tree_vec3s_5_4_3; 'heat' of",
+        ],
+    );
+    let heat = load("heat").unwrap();
+    assert_eq!((&heat.objects[0].name[..], &heat.source[..]), ("heat", "a.vdb, grid heat"));
+    let says = |grid: &str, part: &str| {
+        let error = load(grid).unwrap_err().to_string();
+        assert!(error.contains(part), "{error}");
+    };
+    says("sdf", "distances to surfaces (level sets: 'sdf'), no density");
+    says("surface", "level sets: 'surface'");
+    says("vel", "no grid of Tree_float_5_4_3 (it has: 'vel' of Tree_vec3s_5_4_3)");
+    says("smok", "unknown grid 'smok'; did you mean 'smoke'?");
+    let error = load_with("a.obj", &LoadOptions { grid: Some("a".into()) }).unwrap_err();
+    assert!(error.to_string().contains("no grids to choose from"), "{error}");
+}
+
+#[test]
+fn level_sets_are_known_by_their_values_too() {
+    let [named, unnamed] = level_sets();
+    let both = file(&[named, unnamed.clone()]);
+    let error = load_in(folder(&[("a.vdb", &both)]).path(), "a.vdb").unwrap_err().to_string();
+    assert!(error.contains("level sets: 'sdf', 'surface'"), "{error}");
+    // Densities that are negative here and there are none: there is nothing everywhere else.
+    let scene = Written { background: 0.0, ..unnamed }.load().unwrap();
+    assert_eq!(voxels(&scene).len(), 2);
+    warned(&scene, 1, &["1 voxels of its grid 'surface' are negative and draw nothing"]);
 }

@@ -35,8 +35,8 @@ fn build(values: &Values) -> Scene {
         scene.textures.push(texture);
         scene.materials.push(Material {
             base_texture: Some(TextureUse {
-                texture: i,
                 transform: Affine2::from_scale(Vec2::splat(repeats)),
+                ..TextureUse::plain(i)
             }),
             ..Material::diffuse("fabric", [1.0; 3], 0.4)
         });

@@ -1,11 +1,17 @@
 //! glTF.
 
+mod core_rows;
+mod extension_rows;
+mod inputs;
+mod model;
+mod table;
+
 use glam::{Vec2, Vec3};
 use screendoor::error::Error;
 use screendoor::scene::Scene;
 use serde_json::{Value, json};
 
-use super::{folder, load_in, png, warned};
+use super::{folder, load_in, mesh, png, warned};
 use crate::hostile;
 use crate::util::endlessly_scaled;
 
@@ -60,6 +66,10 @@ fn images_that_say_nothing_are_warnings() {
 #[test]
 fn emissive_textures_keep_their_transform() {
     let scene = gltf(|j| {
+        let mut uvs = j["accessors"][0].clone();
+        uvs["type"] = "VEC2".into();
+        j["accessors"].as_array_mut().unwrap().push(uvs);
+        j["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = 1.into();
         let material = &mut j["materials"][0];
         material["emissiveTexture"]["extensions"] =
             json!({ "KHR_texture_transform": { "offset": [0.5, 0.25], "scale": [2, 4] } });
@@ -70,20 +80,13 @@ fn emissive_textures_keep_their_transform() {
     let transform = scene.materials[0].emissive_texture.unwrap().transform;
     assert_eq!(transform.transform_point2(Vec2::ONE), Vec2::new(2.5, 4.25));
     assert_eq!(scene.warnings, [""; 0]);
-
-    let scene = gltf(|j| {
-        let material = &mut j["materials"][0];
-        material["emissiveTexture"]["texCoord"] = 1.into();
-        material["pbrMetallicRoughness"] = json!({ "baseColorTexture": { "index": 0 } });
-    });
-    warned(&scene.unwrap(), 1, &["material ''", "texture coordinates 1"]);
 }
 
 #[test]
-fn findings_of_the_library_are_errors_of_one_line() {
+fn what_is_wrong_is_an_error_of_one_line() {
     let error = gltf(|j| j["accessors"][0]["componentType"] = 7.into()).unwrap_err().to_string();
-    let wanted = "a.gltf, accessors[0].componentType: its value is not one that glTF allows; \
-                  export the file again";
+    let wanted = "a.gltf, mesh 0, primitive 0, POSITION, accessor 0: its componentType 7 is not \
+                  one that glTF allows; export the file again";
     assert!(error.ends_with(wanted), "{error}");
     let error = gltf(|j| {
         let mut leaf = j["nodes"][0].clone();
@@ -98,4 +101,27 @@ fn findings_of_the_library_are_errors_of_one_line() {
         assert!(error.ends_with(&format!("it wants glTF {version}; export it as glTF 2.0")));
     }
     assert!(gltf(|j| j["asset"]["version"] = "2.1".into()).is_ok());
+}
+
+#[test]
+fn textures_put_on_a_model_find_its_coordinates() {
+    let model = model::Model::quad();
+    let mut scene = model.load().unwrap();
+    let red = png(image::RgbaImage::from_pixel(1, 1, image::Rgba([255, 0, 0, 255])));
+    let folder = folder(&[("red.png", &red)]);
+    scene.apply_texture(&folder.path().join("red.png")).unwrap();
+    assert_eq!(mesh(&scene, 0).uvs[1], Vec2::ONE);
+    assert!(model::is(model::middle(&scene), [1.0, 0.0, 0.0], 1.0));
+}
+
+#[test]
+fn whitening_leaves_opacities_alone() {
+    let mut model = model::Model::quad();
+    model.textured([51, 0, 0, 255], [51, 0, 0, 255]);
+    model.material()["extensions"]["KHR_materials_transmission"] =
+        json!({ "transmissionFactor": 1, "transmissionTexture": { "index": 0 } });
+    let mut scene = model.load().unwrap();
+    scene.whiten();
+    // A fifth of the light goes through what is white now.
+    assert!(model::is(model::middle(&scene), [1.0; 3], 0.8));
 }
