@@ -1,11 +1,14 @@
 //! Pictures: linear colours of a frame's pixels, held tile by tile.
 
+mod exr_file;
+mod opened;
 mod read;
 pub mod srgb;
 mod write;
 
+pub use opened::{AlphaDifference, Laid, Opened, Window, lay};
 pub(crate) use read::can_hold;
-pub use read::read;
+pub use read::{layers, open, read};
 pub use write::{Layer, PictureFile, write_exr, write_png};
 
 use crate::tile::{TILE_PIXELS, TileGrid, TileId, TileMap};
