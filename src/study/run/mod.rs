@@ -14,7 +14,7 @@ use std::path::Path;
 
 pub use check::check;
 pub use measure::SIGMAS;
-pub use merge::merge;
+pub use merge::{agree, merge};
 pub use store::{Store, read_json};
 pub use tasks::{Job, Shard, Task, jobs, tasks};
 
@@ -159,7 +159,7 @@ impl Runner<'_> {
 
     /// The record is written last: a run is there with all that belongs to it, or not.
     fn finish(&self, job: &Job, record: &Record) -> std::result::Result<(), Failure> {
-        Store::put(&self.store.record_file(&job.id), record)?;
+        Store::put_sealed(&self.store.record_file(&job.id), record)?;
         // Of a try before this one.
         let _ = fs::remove_file(self.store.failure_file(&job.id));
         Ok(())
