@@ -20,7 +20,7 @@ pub use tasks::{Job, Shard, Task, jobs, tasks};
 
 use crate::error::{Error, Result, panic_text};
 use crate::picture::{Layer, Picture, write_exr};
-use crate::rop::Site;
+use crate::rop::{ExplainLimits, Site};
 use crate::study::engine::EngineName;
 use crate::study::explained::Explained;
 use crate::study::file::Publication;
@@ -152,8 +152,9 @@ impl Runner<'_> {
         let [x, y] = scene.facts.pixel;
         let trace = (&scene.trace, scene.facts.trace.as_str());
         let site = Site { x, y };
-        let explained =
-            Explained::of(&design, trace, job.samples, study.first_seed, site, &|_, _| ())?;
+        let limits = ExplainLimits { memory: study.memory << 20, ..ExplainLimits::default() };
+        let seed = study.first_seed;
+        let explained = Explained::of(&design, trace, job.samples, seed, site, limits, &|_, _| ())?;
         Ok(Store::put(&self.store.explanation_file(&job.id), &explained)?)
     }
 
