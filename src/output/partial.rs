@@ -69,16 +69,12 @@ impl Partial {
     }
 
     fn named(folder: &Path) -> io::Result<(File, Partial)> {
-        let mut builder = builder();
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt;
-            // The process's umask applies, as to any new file.
-            builder.permissions(fs::Permissions::from_mode(0o666));
-        }
         // Locked from before it exists until it is known.
         let mut known = known();
-        let (file, path) = builder.tempfile_in(folder).map_err(plain)?.into_parts();
+        // Opened here: the crate's own way wraps the system's errors, and makes files that
+        // their owner alone may read.
+        let open = |path: &Path| File::options().read(true).write(true).create_new(true).open(path);
+        let (file, path) = builder().make_in(folder, open)?.into_parts();
         // Says that this process lives. Some file systems have no locks.
         let _ = file.try_lock();
         known.push(path.to_path_buf());
@@ -99,7 +95,7 @@ impl Partial {
                 // Only a rename replaces a file at once.
                 let folder = destination.parent().unwrap_or(Path::new("."));
                 let temporary = builder().make_in(folder, |path| unnamed::link(file, path));
-                let path = temporary.map_err(plain)?.into_temp_path();
+                let path = temporary?.into_temp_path();
                 path.persist(destination).map_err(|e| e.error)
             }
             Partial::Named(path) => {
@@ -122,16 +118,6 @@ impl Drop for Partial {
             known.retain(|p| *p != *path);
             drop(path);
         }
-    }
-}
-
-/// The system's own error, without the temporary name that it is wrapped in.
-fn plain(error: io::Error) -> io::Error {
-    let inner = error.get_ref().and_then(|e| e.source());
-    let inner = inner.and_then(|e| e.downcast_ref::<io::Error>());
-    match error.raw_os_error().or_else(|| inner?.raw_os_error()) {
-        Some(code) => io::Error::from_raw_os_error(code),
-        None => error.kind().into(),
     }
 }
 
@@ -269,8 +255,5 @@ mod tests {
     fn the_system_s_own_error_is_told() {
         let error = Partial::named(Path::new("/no/such/folder")).unwrap_err();
         assert_eq!(error.raw_os_error(), Some(libc::ENOENT));
-        // As where all descriptors are taken.
-        let wrapped = io::Error::from_raw_os_error(libc::EMFILE);
-        assert!(plain(wrapped).to_string().contains("Too many open files"));
     }
 }

@@ -159,12 +159,12 @@ mod tests {
 
     /// What a browser makes of a description, without its paragraph's tags.
     fn shown(description: &str) -> String {
+        use pulldown_cmark::{Options, Parser};
         let text = prose(description);
         let mut page = String::new();
-        pulldown_cmark::html::push_html(
-            &mut page,
-            pulldown_cmark::Parser::new_ext(&text, pulldown_cmark::Options::all()),
-        );
+        // All extensions but the one that makes other characters of dashes and quotes.
+        let options = Options::all() - Options::ENABLE_SMART_PUNCTUATION;
+        pulldown_cmark::html::push_html(&mut page, Parser::new_ext(&text, options));
         page.trim().trim_start_matches("<p>").trim_end_matches("</p>").to_string()
     }
 
