@@ -52,16 +52,16 @@ impl Workplace {
     /// Whether a process has begun a file here: one without a name yet, or with a temporary one.
     #[cfg(unix)]
     fn has_begun(&self, process: u32) -> bool {
-        let named = fs::read_dir(self.0.path()).unwrap().flatten();
+        let mut named = fs::read_dir(self.0.path()).unwrap().flatten();
         let own = |e: fs::DirEntry| e.file_name().to_string_lossy().ends_with(".partial");
-        let open = fs::read_dir(format!("/proc/{process}/fd")).into_iter().flatten().flatten();
+        let mut open = fs::read_dir(format!("/proc/{process}/fd")).into_iter().flatten().flatten();
         let folder = self.0.path().canonicalize().unwrap();
         let unnamed = |e: fs::DirEntry| {
             fs::read_link(e.path()).is_ok_and(|place| {
                 place.starts_with(&folder) && place.to_string_lossy().ends_with(" (deleted)")
             })
         };
-        named.map(own).any(|own| own) || open.map(unnamed).any(|unnamed| unnamed)
+        named.any(own) || open.any(unnamed)
     }
 
     /// A small trace to work on.
