@@ -30,6 +30,9 @@ struct Sum {
 /// half full and has just grown out of one half as large, and one in the table of means.
 const BYTES_PER_PRIMITIVE: u64 = 4 * (size_of::<(u32, Sum)>() + size_of::<(u32, u64)>()) as u64;
 
+/// Bytes that are always allowed: nobody need read a trace in pieces for them.
+const LEAST: u64 = 4 << 20;
+
 /// The error about a trace with more primitives than fit.
 ///
 /// # Errors
@@ -57,11 +60,12 @@ fn too_many(trace: &Trace, memory: u64) -> Result<Error> {
 
 impl PrimitiveDepths {
     /// The depths of the primitives of `trace`, in one pass over it, in at most `memory`
-    /// bytes.
+    /// bytes, or 4 MiB where that is less.
     ///
     /// # Errors
     /// [`Error::Config`] where they take more; as [`Trace::batch`].
     pub fn of(trace: &Trace, memory: u64) -> Result<Self> {
+        let memory = memory.max(LEAST);
         let most = memory / BYTES_PER_PRIMITIVE;
         let mut sums: HashMap<u32, Sum> = HashMap::new();
         for batch in trace.batches() {
