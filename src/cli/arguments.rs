@@ -1,6 +1,7 @@
 //! Arguments that several commands share, and how they are read.
 
 use std::ffi::OsStr;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use clap::builder::{PossibleValue, StringValueParser, TypedValueParser};
@@ -94,6 +95,20 @@ pub(super) fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     numbers
         .and_then(|n| n.try_into().ok())
         .ok_or_else(|| format!("'{text}' is not {N} numbers separated by commas"))
+}
+
+/// `count` seeds from `first` on.
+///
+/// # Errors
+/// [`Error::Config`] where there are not so many left.
+pub(super) fn seeds(first: u32, count: u32) -> Result<RangeInclusive<u32>> {
+    match first.checked_add(count.saturating_sub(1)) {
+        Some(last) => Ok(first..=last),
+        None => Err(Error::config(
+            format_args!("there are no {count} seeds from {first} on: the last is {}", u32::MAX),
+            "give fewer seeds or a lower one",
+        )),
+    }
 }
 
 /// Reads a linear colour that a trace can hold.

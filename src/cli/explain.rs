@@ -8,7 +8,7 @@ use crate::cli::arguments::{RunArguments, numbers};
 use crate::cli::console::{Console, shown};
 use crate::cli::files::{JsonArgument, check, report};
 use crate::error::{Error, Result};
-use crate::rop::{Contents, Site, Step};
+use crate::rop::{Contents, ExplainLimits, Site, Step};
 use crate::study::explained::Explained;
 use crate::trace::{SampleMask, Unorm32};
 
@@ -23,6 +23,9 @@ pub(super) struct Arguments {
     /// Show only the last N fragments
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     last: Option<usize>,
+    /// MiB that the story may take, as text too; a longer one is refused
+    #[arg(long, default_value_t = 512, value_name = "MIB", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=1 << 20))]
+    memory: u64,
     #[command(flatten)]
     json: JsonArgument,
 }
@@ -43,14 +46,14 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let progress = console.progress("searching", "fragments");
     let watch = |done, total| progress.set(done, total);
     let place = (&trace, trace.place());
-    let mut document = Explained::of(&design, place, samples, seed, site, &watch)?;
+    let last = arguments.last.unwrap_or(usize::MAX);
+    let limits = ExplainLimits { last, memory: arguments.memory << 20, ..ExplainLimits::default() };
+    let document = Explained::of(&design, place, samples, seed, site, limits, &watch)?;
     drop(progress);
-    let explanation = &mut document.explanation;
-    let passes = explanation.passes();
-    let all = explanation.steps.len();
-    let left_out = arguments.last.map_or(0, |last| all.saturating_sub(last));
-    let before = explanation.steps.drain(..left_out).next_back().map(|step| step.contents);
     let explanation = &document.explanation;
+    let passes = explanation.passes();
+    let left_out = explanation.left_out as usize;
+    let all = left_out + explanation.steps.len();
     report(json, "screendoor.explain", &document, console, || {
         console.print(format_args!(
             "{} at pixel {},{} of {}: {samples} samples, seed {}",
@@ -66,7 +69,8 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         if left_out > 0 {
             console.print(format_args!("… {left_out} fragments before"))?;
         }
-        let mut before = before.unwrap_or_else(|| explanation.cleared.clone());
+        let before = explanation.before.as_ref().unwrap_or(&explanation.cleared);
+        let mut before = before.clone();
         for (i, step) in explanation.steps.iter().enumerate() {
             print_step(left_out + i + 1, all, passes, step, &before, console)?;
             before = step.contents.clone();

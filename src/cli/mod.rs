@@ -21,6 +21,7 @@ mod study;
 mod throughput;
 mod verify;
 
+use std::io::{self, Write as _};
 use std::process::ExitCode;
 
 use clap::error::{ContextKind, ContextValue};
@@ -76,9 +77,10 @@ pub fn main() -> ExitCode {
                 Console::new(false).error(&error);
                 return ExitCode::from(2);
             }
-            None => error.exit(),
+            None => return told(&error),
         },
     };
+    quiet_drivers();
     let console = Console::new(arguments.quiet);
     signals::clean_up(arguments.quiet);
     match run(&arguments, &console) {
@@ -90,6 +92,31 @@ pub fn main() -> ExitCode {
         }
     }
     ExitCode::from(if console.has_failed() { 1 } else { 0 })
+}
+
+/// Prints what clap has to say: help and the version to standard output, which may be full,
+/// errors to standard error. Returns how the program ends.
+fn told(said: &clap::Error) -> ExitCode {
+    let code = ExitCode::from(u8::try_from(said.exit_code()).unwrap_or(2));
+    let written = said.print().and_then(|()| io::stdout().flush());
+    match written {
+        Err(e) if !said.use_stderr() && e.kind() != io::ErrorKind::BrokenPipe => {
+            Console::new(false).error(&Error::io("write to", "standard output", e));
+            ExitCode::FAILURE
+        }
+        _ => code,
+    }
+}
+
+/// Keeps a library below Vulkan's drivers (libwayland, which a layer of Mesa asks for its
+/// display) from complaining to standard error about a variable that only display servers
+/// need: it is set to a folder that is not there, which says as much and is no complaint.
+fn quiet_drivers() {
+    #[cfg(target_os = "linux")]
+    if std::env::var_os("XDG_RUNTIME_DIR").is_none() {
+        // SAFETY: no other thread runs yet that could read the environment.
+        unsafe { std::env::set_var("XDG_RUNTIME_DIR", "/nonexistent") };
+    }
 }
 
 /// The error about a command whose letters are of another case, of which clap suggests none.

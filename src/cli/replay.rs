@@ -6,7 +6,7 @@ use std::time::Instant;
 use clap::Args;
 use serde::Serialize;
 
-use crate::cli::arguments::{RunArguments, engine_name};
+use crate::cli::arguments::{RunArguments, engine_name, seeds};
 use crate::cli::console::{Console, grouped, shown};
 use crate::cli::files::{JsonArgument, check, report, write_pictures};
 use crate::design::{Configured, REFERENCE, configure};
@@ -96,6 +96,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let mut files = arguments.output.iter().map(create).collect::<Result<Vec<_>>>()?;
     let json = arguments.json.open()?;
     let seed = arguments.run.seed;
+    let seeds = seeds(seed, arguments.seeds)?;
     let progress = console.progress("replaying", "fragments");
     let watch = |done, total| progress.set(done, total);
     let options = ReplayOptions {
@@ -119,9 +120,9 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let errors = match &reference {
         None => None,
         Some(reference) => {
-            let pictures = (1..arguments.seeds).map(|i| {
-                progress.name(&format!("seed {} of {}", i + 1, arguments.seeds));
-                let seed = seed.wrapping_add(i);
+            let pictures = seeds.skip(1).map(|seed| {
+                let place = seed - arguments.run.seed + 1;
+                progress.name(&format!("seed {place} of {}", arguments.seeds));
                 let plain = ReplayOptions { count_events: false, ..options };
                 Ok(engine.replay(&design, &trace, samples, seed, &plain)?.0.picture)
             });

@@ -17,7 +17,7 @@ use crate::report::{About, PAGE, document, write_report};
 use crate::study::file::Study;
 use crate::study::publications::{Effort, measure_publication};
 use crate::study::results::{Missing, Results};
-use crate::study::run::{Runner, Shard, Store, Task, check, merge};
+use crate::study::run::{Runner, Shard, Store, Task, agree, check, merge};
 
 /// Measure a study: what its file says, run by run, into a folder with a report; called
 /// again it goes on where it was interrupted
@@ -77,6 +77,8 @@ pub(super) fn run_merge(arguments: &MergeArguments, console: &Console) -> Result
     let json = arguments.json.open()?;
     let parts = arguments.parts.iter().map(|part| Store::open(part)).collect::<Result<Vec<_>>>()?;
     let Some(first) = parts.first() else { return Ok(()) };
+    // A refused merge leaves nothing behind.
+    agree(&parts.iter().collect::<Vec<_>>())?;
     let store = Store::begin(&arguments.output, first.study())?;
     merge(&store, &parts)?;
     let results = reported(&store, None, json, console)?;

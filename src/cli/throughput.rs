@@ -39,6 +39,9 @@ pub(super) struct Arguments {
     /// How often each is measured, after one replay that warms up
     #[arg(long, default_value_t = 5, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1000))]
     runs: u16,
+    /// MiB that a design may take whose state grows with the fragments
+    #[arg(long, default_value_t = 512, value_name = "MIB", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=1 << 20))]
+    memory: u64,
     #[command(flatten)]
     json: JsonArgument,
 }
@@ -79,7 +82,12 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     };
     let engines = names.iter().map(open).collect::<Result<Vec<_>>>()?;
     let json = arguments.json.open()?;
-    let plan = Plan { designs, samples, runs: usize::from(arguments.runs) };
+    let plan = Plan {
+        designs,
+        samples,
+        runs: usize::from(arguments.runs),
+        memory: arguments.memory << 20,
+    };
     let progress = console.progress("measuring", "replays");
     let results = measure(&trace, &engines, &plan, &|name, done, total| {
         progress.name(name);

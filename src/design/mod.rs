@@ -45,8 +45,8 @@ use crate::param::{Values, parse_spec};
 use crate::rop::fast::{Count, Width};
 use crate::rop::stochastic::draws_opaque_first;
 use crate::rop::{
-    Blueprint, Engine, Explanation, Frame, Info, Layout, Port, PrimitiveDepths, Promises,
-    ReplayOptions, Replayed, Site, StateBits, Which, explain, replay,
+    Blueprint, Engine, ExplainLimits, Explanation, Frame, Info, Layout, Port, PrimitiveDepths,
+    Promises, ReplayOptions, Replayed, Site, StateBits, Which, explain, replay,
 };
 use crate::trace::Trace;
 
@@ -218,7 +218,7 @@ impl Configured {
         seed: u32,
         options: &ReplayOptions<'_>,
     ) -> Result<Replayed> {
-        let frame = self.frame(trace, samples, seed)?;
+        let frame = self.frame_within(trace, samples, seed, options.memory)?;
         replay(&*self.build(&frame, options.engine)?, &frame, trace, options)
     }
 
@@ -270,8 +270,7 @@ impl Configured {
     /// Replays one pixel and writes down what happens.
     ///
     /// # Errors
-    /// As [`crate::rop::explain`] and [`Frame::of`]; [`Error::Config`] for a pixel
-    /// outside the frame.
+    /// As [`Configured::explain_within`].
     pub fn explain(
         &self,
         trace: &Trace,
@@ -280,14 +279,31 @@ impl Configured {
         site: Site,
         progress: &dyn Fn(u64, u64),
     ) -> Result<Explanation> {
-        let frame = self.frame(trace, samples, seed)?;
+        self.explain_within(trace, samples, seed, site, ExplainLimits::default(), progress)
+    }
+
+    /// Replays one pixel and writes down what happens, within what `limits` allow.
+    ///
+    /// # Errors
+    /// As [`crate::rop::explain`] and [`Frame::of`]; [`Error::Config`] for a pixel
+    /// outside the frame.
+    pub fn explain_within(
+        &self,
+        trace: &Trace,
+        samples: u32,
+        seed: u32,
+        site: Site,
+        limits: ExplainLimits,
+        progress: &dyn Fn(u64, u64),
+    ) -> Result<Explanation> {
+        let frame = self.frame_within(trace, samples, seed, limits.memory)?;
         if !frame.grid.contains((site.x.into(), site.y.into())) {
             return Err(Error::config(
                 format_args!("pixel {},{} lies outside the frame", site.x, site.y),
                 format_args!("it is {}x{} pixels", frame.grid.width(), frame.grid.height()),
             ));
         }
-        explain(&*self.build(&frame, Which::Reference)?, &frame, trace, site, progress)
+        explain(&*self.build(&frame, Which::Reference)?, &frame, trace, site, limits, progress)
     }
 
     /// What a pixel holds, at the sample count of `frame`.
@@ -311,12 +327,26 @@ impl Configured {
     /// # Errors
     /// As [`Frame::of`] and [`Trace::batch`].
     pub fn frame(&self, trace: &Trace, samples: u32, seed: u32) -> Result<Frame> {
+        self.frame_within(trace, samples, seed, ReplayOptions::default().memory)
+    }
+
+    /// As [`Configured::frame`]; what it knows of the trace takes at most `memory` bytes.
+    ///
+    /// # Errors
+    /// As [`Frame::of`] and [`Trace::batch`]; [`Error::Config`] where it takes more.
+    pub fn frame_within(
+        &self,
+        trace: &Trace,
+        samples: u32,
+        seed: u32,
+        memory: u64,
+    ) -> Result<Frame> {
         let mut frame = Frame::of(trace, samples, seed)?;
         if draws_opaque_first(&self.values) {
             frame.opaque = trace.has_opaque()?;
         }
         if self.entry.primitive_depths {
-            frame.primitive_depths = Some(Arc::new(PrimitiveDepths::of(trace)?));
+            frame.primitive_depths = Some(Arc::new(PrimitiveDepths::of(trace, memory)?));
         }
         Ok(frame)
     }

@@ -13,9 +13,9 @@ pub use place::same_file;
 use crate::error::{Error, Result};
 use crate::output::partial::Partial;
 
-/// A file under construction: written beside its final place under a temporary
-/// name, and renamed over it by [`OutputFile::commit`]. Dropped without a
-/// commit it vanishes, and what stood in its place before stays as it was.
+/// A file under construction: written beside its final place without a name (or
+/// under a temporary one, where the system has no such files), which
+/// [`OutputFile::commit`] gives it. Dropped without a commit it vanishes, and what stood in its place before stays as it was.
 ///
 /// A destination that exists and is no regular file (`/dev/null`, a pipe) is
 /// written directly, since renaming over it would replace it.
@@ -89,12 +89,7 @@ impl OutputFile {
         }
         let (file, partial) = match Partial::create(folder) {
             Ok(made) => made,
-            // The error itself speaks of the temporary name.
-            Err(e) => {
-                let kind = || io::Error::from(e.kind());
-                let plain = e.raw_os_error().map_or_else(kind, io::Error::from_raw_os_error);
-                return Err(Error::io("create", path, plain));
-            }
+            Err(e) => return Err(Error::io("create", path, e)),
         };
         if let Some(m) = existing {
             // Not every file system has permissions to set.
@@ -125,7 +120,7 @@ impl OutputFile {
             Target::Beside { file, partial, destination } => {
                 let file = file.into_inner().map_err(|e| fail(e.into_error()))?;
                 file.sync_data().map_err(fail)?;
-                partial.persist(&destination).map_err(fail)?;
+                partial.persist(&file, &destination).map_err(fail)?;
             }
         }
         Ok(())

@@ -1,11 +1,14 @@
 //! Pictures: linear colours of a frame's pixels, held tile by tile.
 
+mod exr_file;
+mod opened;
 mod read;
 pub mod srgb;
 mod write;
 
+pub use opened::{AlphaDifference, Laid, Opened, Window, lay};
 pub(crate) use read::can_hold;
-pub use read::read;
+pub use read::{layers, open, read};
 pub use write::{Layer, PictureFile, write_exr, write_png};
 
 use crate::tile::{TILE_PIXELS, TileGrid, TileId, TileMap};
@@ -139,8 +142,13 @@ impl Picture {
     }
 
     /// The BLAKE3 of all pixels' bits, row by row: equal for pictures that are
-    /// equal bit for bit.
+    /// equal bit for bit. Of a frame that no picture file could hold (more than 2^28 pixels)
+    /// it is that of the background and of the tiles that show something else, so that it
+    /// takes as long as there are such tiles.
     pub fn hash(&self) -> String {
+        if u64::from(self.width()) * u64::from(self.height()) > write::MAX_PIXELS {
+            return self.hash_of_tiles();
+        }
         let mut hasher = blake3::Hasher::new();
         for size in [self.width(), self.height()] {
             hasher.update(&size.to_le_bytes());
@@ -157,9 +165,55 @@ impl Picture {
     }
 }
 
+impl Picture {
+    fn hash_of_tiles(&self) -> String {
+        let grid = self.grid();
+        let bytes = |colour: &[f64; 3]| colour.map(|c| c.to_bits().to_le_bytes()).concat();
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(b"tiles");
+        for size in [self.width(), self.height()] {
+            hasher.update(&size.to_le_bytes());
+        }
+        let background = bytes(&self.background);
+        hasher.update(&background);
+        let mut touched: Vec<_> = self.tiles.touched().iter().collect();
+        touched.sort_unstable_by_key(|(id, _)| *id);
+        for (id, pixels) in touched {
+            // What lies beyond the frame is nobody's.
+            let pixel = |(within, colour)| match grid.contains(grid.pixel(*id, within)) {
+                true => bytes(colour),
+                false => background.clone(),
+            };
+            let tile: Vec<u8> = pixels.iter().enumerate().flat_map(pixel).collect();
+            if tile != background.repeat(TILE_PIXELS) {
+                hasher.update(&id.0.to_le_bytes());
+                hasher.update(&tile);
+            }
+        }
+        hasher.finalize().to_hex().to_string()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_vast_frame_is_hashed_by_what_it_shows() {
+        let grid = TileGrid::new(65536, 65535);
+        let mut picture = Picture::new(grid, [0.5; 3]);
+        let empty = picture.hash();
+        picture.tile_mut(grid.tile(9, 9))[TileGrid::within(9, 9)] = [0.5, 0.5, 0.25];
+        let one = picture.hash();
+        assert_ne!(one, empty);
+        // A tile that shows the background is as good as none; so is what lies beyond.
+        let last = grid.tile(65535, 65534);
+        let beyond = (0..TILE_PIXELS).find(|i| !grid.contains(grid.pixel(last, *i))).unwrap();
+        picture.tile_mut(last)[beyond] = [7.0; 3];
+        assert_eq!(picture.hash(), one);
+        picture.tile_mut(last)[TileGrid::within(65535, 65534)] = [0.5, 0.5, 0.25];
+        assert_ne!(picture.hash(), one);
+    }
 
     #[test]
     fn pixels_that_are_not_finite_are_counted() {

@@ -2,30 +2,67 @@
 
 use std::path::Path;
 
-use exr::prelude::{AnyChannels, FlatSamples, ReadChannels, ReadLayers, Text};
 use image::ImageDecoder;
 
 use crate::error::{Error, Result};
-use crate::picture::write::{check_size, exr_error};
-use crate::picture::{Picture, srgb};
+use crate::picture::opened::Opened;
+use crate::picture::write::check_size;
+use crate::picture::{Picture, exr_file, srgb};
 use crate::tile::TileGrid;
 
-/// Reads the picture in an EXR file (its layer `layer`, or the first) or in a
-/// PNG (as sRGB).
+/// Reads the picture in an EXR file (its layer or part `layer`, or the first that is a
+/// picture) or in a PNG (as sRGB): the pixels of its data window.
+///
+/// # Errors
+/// As [`open`].
+pub fn read(path: impl AsRef<Path>, layer: Option<&str>) -> Result<Picture> {
+    Ok(open(path, layer)?.picture)
+}
+
+/// As [`read`], with what the file says of the picture.
 ///
 /// # Errors
 /// [`Error::Io`] where it cannot be read, [`Error::Invalid`] where it is no
 /// such picture, [`Error::Config`] for a layer or format that is not there.
-pub fn read(path: impl AsRef<Path>, layer: Option<&str>) -> Result<Picture> {
+pub fn open(path: impl AsRef<Path>, layer: Option<&str>) -> Result<Opened> {
     let path = path.as_ref();
+    let (format, bytes) = bytes(path)?;
+    match format {
+        Format::Exr => exr_file::read(path, &bytes, layer),
+        Format::Png if layer.is_some() => {
+            Err(Error::config("a PNG has no layers", "leave --layer out, or give an EXR file"))
+        }
+        Format::Png => read_png(path, &bytes),
+    }
+}
+
+/// The names of a file's layers and parts that are pictures; an empty one for what has no
+/// name.
+///
+/// # Errors
+/// As [`open`].
+pub fn layers(path: impl AsRef<Path>) -> Result<Vec<String>> {
+    let path = path.as_ref();
+    let (format, bytes) = bytes(path)?;
+    match format {
+        Format::Exr => exr_file::layers(path, &bytes),
+        Format::Png => Ok(vec![String::new()]),
+    }
+}
+
+#[derive(Clone, Copy)]
+enum Format {
+    Exr,
+    Png,
+}
+
+/// A file's format by its name, and its bytes.
+fn bytes(path: &Path) -> Result<(Format, Vec<u8>)> {
     let ending = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     let bytes = std::fs::read(path).map_err(|e| Error::io("read", path, e))?;
     match ending.as_str() {
-        "exr" => read_exr(path, &bytes, layer),
-        "png" if layer.is_some() => {
-            Err(Error::config("a PNG has no layers", "leave --layer out, or give an EXR file"))
-        }
-        "png" => read_png(path, &bytes),
+        "exr" => Ok((Format::Exr, bytes)),
+        "png" => Ok((Format::Png, bytes)),
         _ => Err(Error::config(
             format_args!("'{}' is no picture that can be read", path.display()),
             "give a .exr or .png file",
@@ -33,7 +70,7 @@ pub fn read(path: impl AsRef<Path>, layer: Option<&str>) -> Result<Picture> {
     }
 }
 
-fn read_png(path: &Path, bytes: &[u8]) -> Result<Picture> {
+fn read_png(path: &Path, bytes: &[u8]) -> Result<Opened> {
     let bad = |e: &dyn std::fmt::Display| {
         Error::invalid(path.display(), format_args!("it cannot be read as PNG ({e})"), "replace it")
     };
@@ -46,12 +83,37 @@ fn read_png(path: &Path, bytes: &[u8]) -> Result<Picture> {
     let (width, height) = decoder.dimensions();
     check_frame(path, width as usize, height as usize)?;
     if !can_hold(bytes, width, height) {
-        return Err(overclaimed(path, format_args!("{width}x{height} pixels"), bytes));
+        return Err(overclaimed(path, format_args!("{width}x{height} pixels"), bytes.len()));
     }
-    let image = image::DynamicImage::from_decoder(decoder).map_err(|e| bad(&e))?.into_rgb8();
-    Ok(Picture::from_fn(TileGrid::new(width, height), |x, y| {
-        image.get_pixel(x, y).0.map(|v| srgb::decode(f64::from(v) / 255.0))
-    }))
+    let image = image::DynamicImage::from_decoder(decoder).map_err(|e| bad(&e))?;
+    let has_alpha = image.color().has_alpha();
+    let grid = TileGrid::new(width, height);
+    // Those of 16 bits are not cut to 8: they would look the same where they are not.
+    let deep = image.color().bytes_per_pixel() > image.color().channel_count();
+    let row = |alphas: &mut dyn Iterator<Item = f32>, opened: &mut Opened, y| {
+        let alphas: Vec<f32> = alphas.collect();
+        opened.put_alpha(0, y, &alphas);
+    };
+    let opened = if deep {
+        let image = image.into_rgba16();
+        let decode = |v: u16| srgb::decode(f64::from(v) / 65535.0);
+        let pixel = |x, y| [0, 1, 2].map(|i| decode(image.get_pixel(x, y).0[i]));
+        let mut opened = Opened::plain(Picture::from_fn(grid, pixel), has_alpha);
+        for (y, pixels) in (0..).zip(image.rows()) {
+            row(&mut pixels.map(|p| f32::from(p.0[3]) / 65535.0), &mut opened, y);
+        }
+        opened
+    } else {
+        let image = image.into_rgba8();
+        let decode = |v: u8| srgb::decode(f64::from(v) / 255.0);
+        let pixel = |x, y| [0, 1, 2].map(|i| decode(image.get_pixel(x, y).0[i]));
+        let mut opened = Opened::plain(Picture::from_fn(grid, pixel), has_alpha);
+        for (y, pixels) in (0..).zip(image.rows()) {
+            row(&mut pixels.map(|p| f32::from(p.0[3]) / 255.0), &mut opened, y);
+        }
+        opened
+    };
+    Ok(opened)
 }
 
 /// How many bytes one byte of a DEFLATE stream can stand for.
@@ -63,76 +125,19 @@ pub(crate) fn can_hold(bytes: &[u8], width: u32, height: u32) -> bool {
     u64::from(width) * u64::from(height) / 8 / DEFLATE <= bytes.len() as u64
 }
 
-/// The same of what EXR files are packed with, more than any of it does.
-const EXR: u64 = 1 << 14;
-
 /// A picture that so short a file cannot hold: it would be allocated before that is found
 /// out.
-fn overclaimed(path: &Path, claimed: std::fmt::Arguments<'_>, bytes: &[u8]) -> Error {
-    let what = format!("it claims {claimed} and is {} bytes long", bytes.len());
+pub(super) fn overclaimed(path: &Path, claimed: std::fmt::Arguments<'_>, length: usize) -> Error {
+    let what = format!("it claims {claimed} and is {length} bytes long");
     Error::invalid(path.display(), what, "it is damaged: replace it")
 }
 
-fn check_frame(path: &Path, width: usize, height: usize) -> Result<()> {
+pub(super) fn check_frame(path: &Path, width: usize, height: usize) -> Result<()> {
     if (1..=1 << 16).contains(&width) && (1..=1 << 16).contains(&height) {
         return check_size(path, width as u32, height as u32);
     }
     let what = format_args!("a picture of {width}x{height} pixels").to_string();
     Err(Error::unsupported(path.display(), what, "each side is 1 to 65536 pixels"))
-}
-
-fn read_exr(path: &Path, bytes: &[u8], layer: Option<&str>) -> Result<Picture> {
-    let bad = |what: &str| {
-        Error::invalid(path.display(), what, "give an EXR file with the channels R, G and B")
-    };
-    // The pixel count first, from the headers alone: nothing is allocated for a
-    // size that a file merely claims.
-    let meta = exr::meta::MetaData::read_from_buffered(std::io::Cursor::new(bytes), true)
-        .map_err(|e| exr_error(path, "read", e))?;
-    for header in &meta.headers {
-        check_frame(path, header.layer_size.0, header.layer_size.1)?;
-        let pixels = (header.layer_size.0 * header.layer_size.1) as u64;
-        let claimed = pixels * header.channels.bytes_per_pixel as u64;
-        if claimed / EXR > bytes.len() as u64 {
-            return Err(overclaimed(path, format_args!("{claimed} bytes of pixels"), bytes));
-        }
-    }
-    let image = exr::prelude::read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .all_channels()
-        .all_layers()
-        .all_attributes()
-        .non_parallel()
-        .from_buffered(std::io::Cursor::new(bytes))
-        .map_err(|e| exr_error(path, "read", e))?;
-    let name = |l: &exr::prelude::Layer<AnyChannels<FlatSamples>>| {
-        l.attributes.layer_name.as_ref().map_or_else(String::new, Text::to_string)
-    };
-    let found = match layer {
-        None => image.layer_data.first().ok_or_else(|| bad("it has no layers"))?,
-        Some(wanted) => {
-            let hit = image.layer_data.iter().find(|l| name(l) == wanted);
-            hit.ok_or_else(|| {
-                let names: Vec<String> = image.layer_data.iter().map(name).collect();
-                Error::unknown(
-                    &format!("layer of {}:", path.display()),
-                    wanted,
-                    names.iter().map(String::as_str),
-                )
-            })?
-        }
-    };
-    let channel = |wanted: &str| {
-        let hit = found.channel_data.list.iter().find(|c| c.name.eq(wanted));
-        hit.map(|c| &c.sample_data).ok_or_else(|| bad(&format!("it has no channel '{wanted}'")))
-    };
-    let channels = [channel("R")?, channel("G")?, channel("B")?];
-    let (width, height) = (found.size.0, found.size.1);
-    Ok(Picture::from_fn(TileGrid::new(width as u32, height as u32), |x, y| {
-        let index = y as usize * width + x as usize;
-        channels.map(|c| f64::from(c.value_by_flat_index(index).to_f32()))
-    }))
 }
 
 #[cfg(test)]

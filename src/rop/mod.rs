@@ -50,8 +50,8 @@ pub use primitive_depths::PrimitiveDepths;
 pub use promise::Promise;
 pub use reference_value::{Reference, ReferenceKey, prehash, scramble_lk2011};
 pub use replay::{
-    Engine, Explanation, ReplayOptions, Replayed, Step, TileState, Told, Which, draw_pixel,
-    explain, replay,
+    Engine, ExplainLimits, Explanation, ReplayOptions, Replayed, Step, TileState, Told, Which,
+    draw_pixel, explain, replay,
 };
 pub use samples::{SampleContents, SampleList, Samples, in_sample_order, sort_by_stored_depth};
 pub use stochastic::{Round, Sampler, Stochastic};

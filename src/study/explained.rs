@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::design::Configured;
 use crate::error::Result;
 use crate::param::Values;
-use crate::rop::{Explanation, Site};
+use crate::rop::{ExplainLimits, Explanation, Site};
 use crate::trace::Trace;
 
 /// What a design does at one pixel, with all that names the run: what
@@ -30,7 +30,7 @@ pub struct Explained<'a> {
 }
 
 impl<'a> Explained<'a> {
-    /// Replays the pixel. `place` names the trace; `progress` is told rows.
+    /// Replays the pixel, within `limits`. `place` names the trace; `progress` is told rows.
     ///
     /// # Errors
     /// As [`Configured::explain`].
@@ -40,12 +40,11 @@ impl<'a> Explained<'a> {
         samples: u32,
         seed: u32,
         site: Site,
+        limits: ExplainLimits,
         progress: &dyn Fn(u64, u64),
     ) -> Result<Self> {
-        let mut explanation = design.explain(trace, samples, seed, site, progress)?;
-        // A pass for opaque fragments does not look at the others.
-        let passes = explanation.passes();
-        explanation.steps.retain(|step| passes == 1 || !step.record.is_idle());
+        let limits = ExplainLimits { idle: false, ..limits };
+        let explanation = design.explain_within(trace, samples, seed, site, limits, progress)?;
         Ok(Explained {
             trace: place,
             design: design.info().name,

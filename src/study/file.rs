@@ -1,6 +1,6 @@
 //! The study file: what to measure, as TOML.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
@@ -286,6 +286,7 @@ impl Study {
         unique("design", &self.designs)?;
         unique("sample count", &self.samples)?;
         unique("scene", &self.scenes.iter().map(|s| &s.name).collect::<Vec<_>>())?;
+        self.one_case()?;
         unique("engine", &self.engines.iter().map(|e| e.name()).collect::<Vec<_>>())?;
         if !(1..=100_000).contains(&self.seeds) {
             return Err(out_of_range("seeds", self.seeds, "1 to 100000"));
@@ -317,6 +318,23 @@ impl Study {
             self.samples.iter().try_for_each(|s| self.design(series, *s).map(|_| ()))?;
         }
         self.scenes.iter().try_for_each(|scene| scene.check(&self.samples))
+    }
+}
+
+impl Study {
+    /// Refuses scenes whose names differ in the case of their letters alone: on some systems
+    /// their files would be the same.
+    fn one_case(&self) -> Result<()> {
+        let mut seen: BTreeMap<String, &str> = BTreeMap::new();
+        for SceneEntry { name, .. } in &self.scenes {
+            if let Some(other) = seen.insert(name.to_ascii_lowercase(), name) {
+                return Err(Error::config(
+                    format_args!("the scenes '{other}' and '{name}' differ in case alone"),
+                    "rename one: their files would be one file where names have no case",
+                ));
+            }
+        }
+        Ok(())
     }
 }
 

@@ -21,6 +21,8 @@ pub struct Plan {
     pub samples: Vec<u32>,
     /// How often each is measured; one more replay warms up.
     pub runs: usize,
+    /// Bytes that the state of a design may take that grows with the fragments.
+    pub memory: u64,
 }
 
 /// The median of several measurements, and the quartiles.
@@ -110,7 +112,7 @@ pub fn measure(
                 for case in &mut cases {
                     let name = format!("{} at {samples} on {}", design.label(), case.name.name());
                     progress(&name, done, total);
-                    case.run(trace, design, *samples, run > 0)?;
+                    case.run(trace, design, *samples, plan.memory, run > 0)?;
                     done += 1;
                 }
             }
@@ -159,6 +161,7 @@ impl<'a> Case<'a> {
         trace: &Trace,
         design: &Configured,
         samples: u32,
+        memory: u64,
         counts: bool,
     ) -> Result<()> {
         if matches!(self.engine, Engine::Gpu(..)) && !design.is_ported() {
@@ -166,7 +169,7 @@ impl<'a> Case<'a> {
             return Ok(());
         }
         let start = Instant::now();
-        let options = ReplayOptions::default();
+        let options = ReplayOptions { memory, ..ReplayOptions::default() };
         let (replayed, gpu) = self.engine.replay(design, trace, samples, 0, &options)?;
         let whole = start.elapsed().as_secs_f64();
         self.passes = replayed.passes;

@@ -22,6 +22,7 @@ mod read;
 mod seal;
 mod stats;
 mod stored;
+mod stored_file;
 mod stream;
 mod ties;
 mod write;

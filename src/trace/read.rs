@@ -20,14 +20,14 @@ use crate::trace::header::Header;
 use crate::trace::layout::{BatchLayout, Block, Layout};
 use crate::trace::seal::{CHECKSUMS, CHECKSUMS_KIND, Seal, damaged};
 use crate::trace::stored::StoredColumns;
+use crate::trace::stored_file::{self, StoredFile};
 
 /// A trace that is open for reading. Cloning shares it.
 ///
-/// Opening reads the head and the footer; batches are mapped and checked when
-/// they are asked for and unmapped when dropped, so that memory is bounded by
-/// the batches in use. The file must not change while it is open: a file that
-/// another program shortens under a memory map ends the process, as with any
-/// memory map.
+/// Opening reads the head and the footer; batches are read and checked when they are
+/// asked for, so that memory is bounded by the batches in use. What was checked is a
+/// copy: another program that writes to the file meanwhile, or cuts it, causes an error
+/// and never a wrong value.
 #[derive(Clone, Debug)]
 pub struct Trace {
     inner: Arc<Inner>,
@@ -67,12 +67,13 @@ pub enum Checksums {
 
 #[derive(Debug)]
 enum Storage {
-    File(File),
+    File(StoredFile),
     Memory(Bytes),
 }
 
 impl Storage {
-    /// The bytes at `offset`, mapped or shared, never copied.
+    /// The bytes at `offset`: shared, or read into memory of our own, which no other program
+    /// can change after they have been checked.
     fn bytes(&self, place: &str, offset: u64, length: usize) -> Result<Bytes> {
         match self {
             Storage::Memory(bytes) => {
@@ -80,17 +81,15 @@ impl Storage {
                 Ok(bytes.slice(start..start + length))
             }
             Storage::File(_) if length == 0 => Ok(Bytes::new()),
-            Storage::File(file) => {
-                let mut options = MmapOptions::new();
-                // All of it is about to be read: mapped at once, its pages cost no faults.
-                options.offset(offset).len(length).populate();
-                // SAFETY: the map is read-only. Another process that changes the file
-                // could change bytes behind the slice; the type's documentation
-                // forbids that, as there is no way to prevent it.
-                let map = unsafe { options.map(file) };
-                let map = map.map_err(|e| Error::io("read", place, e))?;
-                Ok(Bytes::from_owner(map))
-            }
+            Storage::File(file) => file.bytes(place, offset, length),
+        }
+    }
+
+    /// The error about a file that was written to since it was opened, where it was.
+    fn changed(&self, place: &str) -> Option<Error> {
+        match self {
+            Storage::Memory(_) => None,
+            Storage::File(file) => file.has_changed().then(|| stored_file::changed(place)),
         }
     }
 }
@@ -113,6 +112,7 @@ impl Trace {
         let length = usize::try_from(metadata.len()).map_err(|_| {
             Error::unsupported(path.display(), "the file is too large", "use a 64-bit machine")
         })?;
+        let file = StoredFile::new(file, &metadata);
         Self::read(path.display().to_string(), Storage::File(file), length)
     }
 
@@ -132,8 +132,10 @@ impl Trace {
             // Only the head and the footer are touched.
             Storage::File(_) if length == 0 => Bytes::new(),
             Storage::File(file) => {
-                // SAFETY: as in `Storage::bytes`.
-                let map = unsafe { MmapOptions::new().len(length).map(file) };
+                // SAFETY: the map is read-only and goes before this returns. Another process
+                // that changes the file could change bytes behind the slice meanwhile; what
+                // of them is kept is copied, and held against the batches when they are read.
+                let map = unsafe { MmapOptions::new().len(length).map(file.file()) };
                 Bytes::from_owner(map.map_err(|e| Error::io("read", &place, e))?)
             }
         };
@@ -297,8 +299,11 @@ impl Trace {
         let block = &inner.blocks[i];
         let place = batch_place(&inner.place, i, block);
         let bytes = inner.storage.bytes(&inner.place, block.offset, block.bytes())?;
-        if let Some(seal) = &inner.seal {
-            check_crc(&bytes, seal.blocks[i + 1].crc, &place)?;
+        match &inner.seal {
+            Some(seal) => check_crc(&bytes, seal.blocks[i + 1].crc, &place)
+                .map_err(|damage| inner.storage.changed(&inner.place).unwrap_or(damage))?,
+            // Nothing else would tell.
+            None => inner.storage.changed(&inner.place).map_or(Ok(()), Err)?,
         }
         let layout = BatchLayout::parse(&bytes, block, &inner.stored, &place)?;
         if layout.rows as u64 != inner.block_rows[i] {

@@ -1,5 +1,6 @@
 //! The program as its users run it.
 
+mod compare;
 mod gpu;
 mod outputs;
 mod study;
@@ -47,6 +48,21 @@ impl Workplace {
         let code = output.status.code().unwrap_or_else(|| panic!("{arguments:?}: {error}"));
         assert!(code == 1 || code == 2, "{arguments:?} ended with {code}: {error}");
         (code, error)
+    }
+
+    /// Whether a process has begun a file here: one without a name yet, or with a temporary one.
+    #[cfg(unix)]
+    fn has_begun(&self, process: u32) -> bool {
+        let mut named = fs::read_dir(self.0.path()).unwrap().flatten();
+        let own = |e: fs::DirEntry| e.file_name().to_string_lossy().ends_with(".partial");
+        let mut open = fs::read_dir(format!("/proc/{process}/fd")).into_iter().flatten().flatten();
+        let folder = self.0.path().canonicalize().unwrap();
+        let unnamed = |e: fs::DirEntry| {
+            fs::read_link(e.path()).is_ok_and(|place| {
+                place.starts_with(&folder) && place.to_string_lossy().ends_with(" (deleted)")
+            })
+        };
+        named.any(own) || open.any(unnamed)
     }
 
     /// A small trace to work on.

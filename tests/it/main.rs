@@ -19,6 +19,7 @@ mod inputs;
 mod large;
 mod layering;
 mod layers;
+mod limits;
 mod loaders;
 mod models;
 mod python;

@@ -13,7 +13,7 @@ const NONE: &str = "—";
 pub fn markdown(results: &Results) -> String {
     let study = &results.study;
     let mut text = format!("# {}\n", escaped(&study.name));
-    paragraph(&mut text, study.description.trim());
+    paragraph(&mut text, &prose(study.description.trim()));
     let how = format!(
         "{} from {}, where a seed changes anything. Errors are over the covered pixels, against \
          the exact picture of the same samples, on linear values in units of 1/255, ± half of \
@@ -131,10 +131,65 @@ fn escaped(text: &str) -> String {
     safe
 }
 
+/// A text of several sentences as one paragraph that is no markup.
+fn prose(text: &str) -> String {
+    let mut safe = String::new();
+    for c in escaped(text).chars() {
+        match c {
+            '_' | '~' | '$' | ']' | '>' => safe.push_str(&format!("&#{};", u32::from(c))),
+            c => safe.push(c),
+        }
+    }
+    // At a line's start other characters make headings, lists and lines.
+    let digits = safe.len() - safe.trim_start_matches(|c: char| c.is_ascii_digit()).len();
+    let at = if safe[digits..].starts_with(['.', ')']) { digits } else { 0 };
+    match safe[at..].chars().next() {
+        Some(c) if matches!(c, '#' | '+' | '-' | '=' | ':') || at > 0 => {
+            safe.replace_range(at..=at, &format!("&#{};", u32::from(c)));
+        }
+        _ => {}
+    }
+    safe
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::study::analysis::made_up::plausible;
+
+    /// What a browser makes of a description, without its paragraph's tags.
+    fn shown(description: &str) -> String {
+        use pulldown_cmark::{Options, Parser};
+        let text = prose(description);
+        let mut page = String::new();
+        // All extensions but the one that makes other characters of dashes and quotes.
+        let options = Options::all() - Options::ENABLE_SMART_PUNCTUATION;
+        pulldown_cmark::html::push_html(&mut page, Parser::new_ext(&text, options));
+        page.trim().trim_start_matches("<p>").trim_end_matches("</p>").to_string()
+    }
+
+    #[test]
+    fn a_description_is_no_markup() {
+        for text in [
+            "Plain words, of a state-of-the-art study (8 bits).",
+            "# Not a heading",
+            "- no item",
+            "+ none",
+            "1. none",
+            "22) none",
+            "=== no underline",
+            "--- no rule",
+            "---",
+            "![picture](http://nowhere/a.png) and [link](x) and [^note]",
+            "a | b | c",
+            "*a* _b_ __c__ ~~d~~ `e` $f$ \\g",
+        ] {
+            assert_eq!(shown(text), text, "{text}");
+        }
+        assert_eq!(shown("one\n\n# two\r\n- three"), "one  # two  - three");
+        assert_eq!(shown("<script>x</script> &amp;"), "&lt;script&gt;x&lt;/script&gt; &amp;amp;");
+        assert_eq!(shown("> a"), "&gt; a");
+    }
 
     /// A table row's cells.
     fn cells(line: &str) -> Vec<&str> {

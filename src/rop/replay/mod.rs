@@ -21,7 +21,7 @@ use rayon::prelude::*;
 
 pub use engine::{Engine, TileState, Told};
 pub(in crate::rop) use engine::{Listener, sites};
-pub use explain::{Explanation, Step, draw_pixel, explain};
+pub use explain::{ExplainLimits, Explanation, Step, draw_pixel, explain};
 
 use crate::error::{Error, Result};
 use crate::param::Options;

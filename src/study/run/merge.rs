@@ -13,25 +13,38 @@ use crate::study::run::store::Store;
 /// done again it changes nothing.
 ///
 /// # Errors
-/// [`Error::Config`] where a part is of another study; [`Error::Invalid`] where two parts
-/// had different traces for a scene, or differ in what is no measured time; [`Error::Io`].
+/// As [`agree`]; [`Error::Io`].
 pub fn merge(into: &Store, parts: &[Store]) -> Result<()> {
-    // All is compared before anything is written.
-    for part in parts {
-        if part.study() != into.study() {
-            let (a, b) = (part.folder().display(), into.folder().display());
+    let all: Vec<&Store> = std::iter::once(into).chain(parts).collect();
+    agree(&all)?;
+    parts.iter().try_for_each(|part| bring(into, part))
+}
+
+/// Finds out whether parts can be put together. Nothing is written.
+///
+/// # Errors
+/// [`Error::Config`] where they are of different studies; [`Error::Invalid`] where two of them
+/// had different traces for a scene, or differ in what is no measured time, and where a
+/// record is damaged.
+pub fn agree(parts: &[&Store]) -> Result<()> {
+    let Some((first, others)) = parts.split_first() else { return Ok(()) };
+    for part in others {
+        if part.study() != first.study() {
+            let (a, b) = (part.folder().display(), first.folder().display());
             return Err(Error::config(
                 format_args!("{a} and {b} are parts of different studies"),
                 "put parts of one study together",
             ));
         }
     }
-    for scene in 0..into.study().scenes.len() {
-        same_scene(into, parts, scene)?;
+    for scene in 0..first.study().scenes.len() {
+        same_scene(parts, scene)?;
     }
-    for job in into.jobs() {
+    // What each part holds must agree in itself, too.
+    parts.iter().try_for_each(|part| part.results().map(|_| ()))?;
+    for job in first.jobs() {
         let mut known: Option<(Record, &Store)> = None;
-        for store in std::iter::once(into).chain(parts) {
+        for store in parts {
             let Some(mut record) = store.record(job)? else { continue };
             record.speed.clear();
             match &known {
@@ -48,12 +61,12 @@ pub fn merge(into: &Store, parts: &[Store]) -> Result<()> {
             }
         }
     }
-    parts.iter().try_for_each(|part| bring(into, part))
+    Ok(())
 }
 
-fn same_scene(into: &Store, parts: &[Store], scene: usize) -> Result<()> {
+fn same_scene(parts: &[&Store], scene: usize) -> Result<()> {
     let mut known: Option<(String, &Store)> = None;
-    for store in std::iter::once(into).chain(parts) {
+    for store in parts {
         let Some(facts) = store.facts(scene)? else { continue };
         match &known {
             Some((content, other)) if *content != facts.content => {

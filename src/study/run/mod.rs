@@ -14,13 +14,13 @@ use std::path::Path;
 
 pub use check::check;
 pub use measure::SIGMAS;
-pub use merge::merge;
+pub use merge::{agree, merge};
 pub use store::{Store, read_json};
 pub use tasks::{Job, Shard, Task, jobs, tasks};
 
 use crate::error::{Error, Result, panic_text};
 use crate::picture::{Layer, Picture, write_exr};
-use crate::rop::Site;
+use crate::rop::{ExplainLimits, Site};
 use crate::study::engine::EngineName;
 use crate::study::explained::Explained;
 use crate::study::file::Publication;
@@ -152,14 +152,15 @@ impl Runner<'_> {
         let [x, y] = scene.facts.pixel;
         let trace = (&scene.trace, scene.facts.trace.as_str());
         let site = Site { x, y };
-        let explained =
-            Explained::of(&design, trace, job.samples, study.first_seed, site, &|_, _| ())?;
+        let limits = ExplainLimits { memory: study.memory << 20, ..ExplainLimits::default() };
+        let seed = study.first_seed;
+        let explained = Explained::of(&design, trace, job.samples, seed, site, limits, &|_, _| ())?;
         Ok(Store::put(&self.store.explanation_file(&job.id), &explained)?)
     }
 
     /// The record is written last: a run is there with all that belongs to it, or not.
     fn finish(&self, job: &Job, record: &Record) -> std::result::Result<(), Failure> {
-        Store::put(&self.store.record_file(&job.id), record)?;
+        Store::put_sealed(&self.store.record_file(&job.id), record)?;
         // Of a try before this one.
         let _ = fs::remove_file(self.store.failure_file(&job.id));
         Ok(())

@@ -125,7 +125,7 @@ fn facts(
         },
         statistics: statistics(trace, |_| ())?,
     };
-    Store::put(&store.scene_file(index), &facts)?;
+    Store::put_sealed(&store.scene_file(index), &facts)?;
     Ok(facts)
 }
 

@@ -14,6 +14,7 @@ use crate::study::file::{Publication, Study};
 use crate::study::record::Record;
 use crate::study::results::{Machine, Missing, Results, SceneFacts};
 use crate::study::run::tasks::{Job, jobs};
+use crate::trace::Trace;
 
 /// The folder of a study.
 ///
@@ -32,6 +33,7 @@ pub struct Store {
 const FOLDERS: [&str; 6] = ["scenes", "traces", "runs", "pictures", "explain", "verification"];
 const STUDY: &str = "study.toml";
 const MACHINES: &str = "machine.json";
+const LOCK: &str = ".lock";
 
 /// A run's record in a study's folder.
 pub(super) fn record_path(folder: &Path, id: &str) -> PathBuf {
@@ -84,34 +86,11 @@ impl Store {
         let create =
             |path: &Path| fs::create_dir_all(path).map_err(|e| Error::io("create", path, e));
         let path = folder.join(STUDY);
-        let mut taken_over = false;
-        match path.try_exists() {
-            Ok(true) => {
-                let there = Study::read(&path)?;
-                taken_over = there != *study && !holds_results(folder);
-                if there != *study && !taken_over {
-                    return Err(another(folder));
-                }
-            }
-            Ok(false) => {
-                let mut entries = fs::read_dir(folder).into_iter().flatten().flatten();
-                // Files under construction and the lock begin with a dot.
-                if entries.any(|e| !e.file_name().as_encoded_bytes().starts_with(b".")) {
-                    return Err(Error::config(
-                        format_args!("{} is not empty and holds no study", folder.display()),
-                        "name a new folder",
-                    ));
-                }
-                create(folder)?;
-            }
-            Err(e) => return Err(Error::io("read", &path, e)),
-        }
+        look(folder, study)?;
+        create(folder)?;
         let lock = lock(folder)?;
-        if taken_over {
-            // Who had the lock before may have measured something.
-            if holds_results(folder) {
-                return Err(another(folder));
-            }
+        // Who had the lock before may have begun a study or measured something.
+        if look(folder, study)? == Found::Idle {
             clear(folder);
         }
         remove_partial(folder);
@@ -208,7 +187,7 @@ impl Store {
     /// # Errors
     /// [`Error::Invalid`] for a damaged file; [`Error::Io`] where it cannot be read.
     pub fn facts(&self, scene: usize) -> Result<Option<SceneFacts>> {
-        read_json(&self.scene_file(scene))
+        read_sealed(&self.scene_file(scene))
     }
 
     /// A run's record, where it is finished.
@@ -217,7 +196,7 @@ impl Store {
     /// As [`Store::facts`].
     pub fn record(&self, job: &Job) -> Result<Option<Record>> {
         let path = self.record_file(&job.id);
-        let record: Option<Record> = read_json(&path)?;
+        let record: Option<Record> = read_sealed(&path)?;
         let own = |r: &Record| {
             (r.series.as_str(), r.samples) == (job.series.as_str(), job.samples)
                 && r.scene == self.study.scenes[job.scene].name
@@ -237,6 +216,18 @@ impl Store {
             .map_err(|e| Error::io("write", path, io::Error::other(e)))?;
         bytes.push(b'\n');
         OutputFile::put(path, &bytes)
+    }
+
+    /// Writes a value as JSON that bears a checksum of its own.
+    ///
+    /// # Errors
+    /// As [`Store::put`].
+    pub fn put_sealed<T: Serialize>(path: &Path, value: &T) -> Result<()> {
+        let fail = |e| Error::io("write", path, io::Error::other(e));
+        // What is read again is what is hashed.
+        let text = serde_json::to_string(value).map_err(fail)?;
+        let sealed = Sealed { value, checksum: checksum(&text).map_err(fail)? };
+        Store::put(path, &sealed)
     }
 
     /// Puts down that a run could not be done.
@@ -280,11 +271,23 @@ impl Store {
             records: Vec::new(),
             missing: Vec::new(),
         };
+        let mut contents = Vec::with_capacity(self.study.scenes.len());
         for scene in 0..self.study.scenes.len() {
-            results.scenes.extend(self.facts(scene)?);
+            let facts = self.facts(scene)?;
+            if let Some(facts) = &facts {
+                self.same_trace(scene, facts)?;
+            }
+            contents.push(facts.as_ref().map(|facts| facts.content.clone()));
+            results.scenes.extend(facts);
         }
         for job in &self.jobs {
             match self.record(job)? {
+                Some(record)
+                    if contents[job.scene].as_ref().is_some_and(|c| *c != record.trace) =>
+                {
+                    let what = "it was measured on another trace than its scene's file says";
+                    return Err(damaged(&self.record_file(&job.id), what));
+                }
                 Some(record) => results.records.push(record),
                 None => {
                     let failure: Option<Missing> = read_json(&self.failure_file(&job.id))?;
@@ -293,6 +296,24 @@ impl Store {
             }
         }
         Ok(results)
+    }
+
+    /// Refuses a trace in the folder that is not the one that was measured. Where it is not
+    /// there any more, nothing speaks against the results.
+    fn same_trace(&self, scene: usize, facts: &SceneFacts) -> Result<()> {
+        let path = self.folder.join(self.trace_name(scene));
+        if self.study.scenes[scene].trace.is_some() || !path.exists() {
+            return Ok(());
+        }
+        let trace = Trace::open(&path)?;
+        match trace.content() {
+            Some(content) if content == facts.content => Ok(()),
+            _ => Err(Error::invalid(
+                path.display(),
+                format_args!("it is not the trace that scene '{}' was measured on", facts.name),
+                "bring the old one back, or measure the study in another folder",
+            )),
+        }
     }
 
     fn missing(&self, job: &Job, why: Option<String>) -> Missing {
@@ -326,15 +347,62 @@ fn remove_partial(folder: &Path) {
     }
 }
 
+/// What stands in a folder that a study is to be measured in.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Found {
+    Nothing,
+    /// The same study.
+    Same,
+    /// Another study of which nothing is measured.
+    Idle,
+}
+
+/// Looks into the folder.
+///
+/// # Errors
+/// [`Error::Config`] where it is another study's or something else's, or another program is
+/// just beginning one there; [`Error::Io`].
+fn look(folder: &Path, study: &Study) -> Result<Found> {
+    let path = folder.join(STUDY);
+    let is_there = || path.try_exists().map_err(|e| Error::io("read", &path, e));
+    if !is_there()? {
+        let mut entries = fs::read_dir(folder).into_iter().flatten().flatten();
+        // Files under construction and the lock begin with a dot.
+        if !entries.any(|e| !e.file_name().as_encoded_bytes().starts_with(b".")) {
+            return Ok(Found::Nothing);
+        }
+        // A program that begins a study makes its folders first, under the lock.
+        let held = File::options().write(true).open(folder.join(LOCK));
+        if held.is_ok_and(|file| matches!(file.try_lock(), Err(TryLockError::WouldBlock))) {
+            return Err(at_work(folder));
+        }
+        if !is_there()? {
+            return Err(Error::config(
+                format_args!("{} is not empty and holds no study", folder.display()),
+                "name a new folder",
+            ));
+        }
+    }
+    match Study::read(&path)? == *study {
+        true => Ok(Found::Same),
+        false if holds_results(folder) => Err(another(folder)),
+        false => Ok(Found::Idle),
+    }
+}
+
+fn at_work(folder: &Path) -> Error {
+    Error::config(
+        format_args!("another screendoor is at work in {}", folder.display()),
+        "wait for it to end, or name another folder",
+    )
+}
+
 fn lock(folder: &Path) -> Result<File> {
-    let path = folder.join(".lock");
+    let path = folder.join(LOCK);
     let file = File::options().create(true).truncate(false).write(true).open(&path);
     let file = file.map_err(|e| Error::io("create", &path, e))?;
     match file.try_lock() {
-        Err(TryLockError::WouldBlock) => Err(Error::config(
-            format_args!("another screendoor is at work in {}", folder.display()),
-            "wait for it to end, or name another folder",
-        )),
+        Err(TryLockError::WouldBlock) => Err(at_work(folder)),
         // Some file systems have no locks: files are whole there too.
         Ok(()) | Err(TryLockError::Error(_)) => Ok(file),
     }
@@ -351,6 +419,41 @@ pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<Option<T>> {
         Err(e) => return Err(Error::io("read", path, e)),
     };
     serde_json::from_slice(&bytes).map(Some).map_err(|e| damaged(path, &e.to_string()))
+}
+
+/// A value with the checksum of its text.
+#[derive(Serialize)]
+struct Sealed<'a, T> {
+    #[serde(flatten)]
+    value: &'a T,
+    checksum: String,
+}
+
+const CHECKSUM: &str = "checksum";
+
+/// The BLAKE3 of a JSON object's text, whatever its spaces.
+fn checksum(text: &str) -> serde_json::Result<String> {
+    let value: serde_json::Value = serde_json::from_str(text)?;
+    Ok(blake3::hash(&serde_json::to_vec(&value)?).to_hex().to_string())
+}
+
+/// As [`read_json`], for a value that [`Store::put_sealed`] wrote.
+///
+/// # Errors
+/// As [`read_json`]; [`Error::Invalid`] where it bears no checksum or another one than its
+/// text has.
+fn read_sealed<T: DeserializeOwned>(path: &Path) -> Result<Option<T>> {
+    use serde_json::{Map, Value};
+    let Some(mut fields) = read_json::<Map<String, Value>>(path)? else { return Ok(None) };
+    let bad = |e: serde_json::Error| damaged(path, &e.to_string());
+    let Some(Value::String(written)) = fields.remove(CHECKSUM) else {
+        return Err(damaged(path, "it bears no checksum"));
+    };
+    let text = serde_json::to_string(&fields).map_err(bad)?;
+    if checksum(&text).map_err(bad)? != written {
+        return Err(damaged(path, "it was changed after it was written: its checksum differs"));
+    }
+    serde_json::from_str(&text).map(Some).map_err(bad)
 }
 
 fn damaged(path: &Path, what: &str) -> Error {

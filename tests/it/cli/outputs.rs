@@ -152,10 +152,11 @@ fn interrupt(
         .stderr(Stdio::null())
         .spawn()
         .unwrap();
-    let begun = || files(place.0.path()).iter().any(|name| name.ends_with(".partial"));
+    let id = child.id();
+    let begun = || place.has_begun(id);
     (0..600).take_while(|_| !begun()).for_each(|_| pause());
     let there = begun();
-    let id = child.id().to_string();
+    let id = id.to_string();
     let send = |signal: &str| Command::new("kill").args([signal, &id]).status().unwrap().success();
     let mut sent = send(signal);
     if lives_on {
@@ -263,4 +264,52 @@ fn a_full_disk_leaves_the_good_file_and_nothing_else() {
     }
     assert_eq!(shell(&place, "exec \"$PROGRAM\" capture builtin:ramps -o /dev/null").0, Some(0));
     assert!(!fs::metadata("/dev/null").unwrap().is_file());
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_program_that_is_killed_leaves_nothing_where_files_need_no_names() {
+    let place = Workplace::new();
+    let status = interrupt(&place, "", "-KILL", false);
+    assert!(!status.success());
+    // Where the file system has none, the next command removes what was left.
+    let left = files(place.0.path());
+    assert!(left.is_empty() || left.iter().all(|name| name.ends_with(".partial")), "{left:?}");
+    if !left.is_empty() {
+        eprintln!("skipped: {} has no files without names", place.0.path().display());
+    }
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn help_that_cannot_be_written_is_an_error() {
+    let place = Workplace::new();
+    for arguments in ["--help", "--version", "replay --help", "designs"] {
+        let (code, error) = shell(&place, &format!("\"$PROGRAM\" {arguments} > /dev/full"));
+        assert_eq!(code, Some(1), "{arguments}: {error}");
+        assert!(error.contains("cannot write to standard output: No space left"), "{error}");
+        assert_eq!(error.lines().count(), 1, "{error}");
+    }
+    let (code, error) = shell(&place, "\"$PROGRAM\" nonsense > /dev/full");
+    assert_eq!(code, Some(2), "{error}");
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn all_descriptors_taken_is_said_so() {
+    let place = Workplace::with_trace();
+    // What the program opens before its output does not fit into fewer.
+    for most in 4..12 {
+        let command = format!("ulimit -n {most}; \"$PROGRAM\" replay t.arrow -o x.exr 2>&1 >&-");
+        let (_, said) = shell(&place, &format!("{{ {command}; }} >&2"));
+        assert!(!said.contains("uncategorized") && !said.contains("panicked"), "{most}: {said}");
+    }
+}
+
+#[test]
+fn seeds_that_run_out_are_refused() {
+    let place = Workplace::with_trace();
+    let (code, error) = place.bad(&["replay", "t.arrow", "--seed", "4294967294", "--seeds", "3"]);
+    assert!(code == 2 && error.contains("there are no 3 seeds from 4294967294 on"), "{error}");
+    place.good(&["replay", "t.arrow", "--seed", "4294967294", "--seeds", "2", "--samples", "1"]);
 }

@@ -43,6 +43,16 @@ fn with_study(change: &[(&str, &str)]) -> Workplace {
     place
 }
 
+/// Changes a record, as a program that measured something else would have written it.
+fn rewrite(path: &Path, change: impl FnOnce(&mut Value)) {
+    let mut record: Value = serde_json::from_slice(&fs::read(path).unwrap()).unwrap();
+    change(&mut record);
+    record.as_object_mut().unwrap().remove("checksum").unwrap();
+    let checksum = blake3::hash(&serde_json::to_vec(&record).unwrap()).to_hex().to_string();
+    record["checksum"] = checksum.into();
+    fs::write(path, record.to_string()).unwrap();
+}
+
 /// What must be the same however a study came to its end.
 fn results(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut files = BTreeMap::new();
@@ -159,20 +169,20 @@ fn parts_of_different_studies_or_traces_are_refused() {
 
     place.good(&["study", "s.toml", "-o", "c", "--shard", "1/2"]);
     let scene = place.path("c/scenes/glass.json");
-    let mut facts: Value = serde_json::from_slice(&fs::read(&scene).unwrap()).unwrap();
-    facts["content"] = "0".repeat(64).into();
-    fs::write(&scene, facts.to_string()).unwrap();
+    rewrite(&scene, |facts| facts["content"] = "0".repeat(64).into());
     let (code, error) = place.bad(&["merge", "m2", "a", "c"]);
     assert!(code == 1 && error.contains("different traces of scene 'glass'"), "{error}");
 
     // Errors that differ: two versions of the program, say.
     place.good(&["study", "s.toml", "-o", "d", "--shard", "1/2"]);
     let run = place.path("d/runs/glass.4.lk.json");
-    let mut record: Value = serde_json::from_slice(&fs::read(&run).unwrap()).unwrap();
-    record["covered"]["rmse"]["value"] = 1.0.into();
-    fs::write(&run, record.to_string()).unwrap();
+    rewrite(&run, |record| record["covered"]["rmse"]["value"] = 1.0.into());
     let (code, error) = place.bad(&["merge", "m3", "a", "d"]);
     assert!(code == 1 && error.contains("different errors for one run"), "{error}");
+    // What is refused leaves no folder.
+    for folder in ["m", "m2", "m3"] {
+        assert!(!place.path(folder).exists(), "{folder}");
+    }
 }
 
 #[test]
@@ -201,6 +211,89 @@ fn a_folder_is_one_study_and_nothing_else_is_overwritten() {
     assert!(code == 1 && error.contains("remove it to have it measured again"), "{error}");
     let (code, error) = place.bad(&["report", "nowhere"]);
     assert!(code == 1 && error.contains("no study has been measured there"), "{error}");
+}
+
+#[test]
+fn what_was_changed_after_it_was_measured_is_refused() {
+    let place = with_study(&[]);
+    place.good(&["study", "s.toml", "-o", "out"]);
+    let refused = |what: &str| {
+        for arguments in [&["report", "out"][..], &["study", "s.toml", "-o", "out"]] {
+            let (code, error) = place.bad(arguments);
+            assert!(code == 1 && error.contains(what), "{arguments:?}: {error}");
+        }
+    };
+    // A digit of a record, and of a scene's facts.
+    for (name, at) in [("runs/glass.4.lk.json", "\"rmse\""), ("scenes/glass.json", "\"fragments\"")]
+    {
+        let path = place.path("out").join(name);
+        let good = fs::read_to_string(&path).unwrap();
+        let after = good.find(at).unwrap() + at.len();
+        let digit = after + good[after..].find(|c: char| c.is_ascii_digit()).unwrap();
+        let other = if &good[digit..=digit] == "7" { "8" } else { "7" };
+        fs::write(&path, format!("{}{other}{}", &good[..digit], &good[digit + 1..])).unwrap();
+        refused("its checksum differs");
+        // Spaces are no values.
+        let value: Value = serde_json::from_str(&good).unwrap();
+        fs::write(&path, value.to_string()).unwrap();
+        place.good(&["report", "out"]);
+        fs::write(&path, good).unwrap();
+    }
+    // A record of another trace, and another trace in place of the one that was measured.
+    let path = place.path("out/runs/glass.4.lk.json");
+    let good = fs::read(&path).unwrap();
+    rewrite(&path, |record| record["trace"] = "0".repeat(64).into());
+    let (code, error) = place.bad(&["report", "out"]);
+    assert!(code == 1 && error.contains("measured on another trace"), "{error}");
+    fs::write(&path, good).unwrap();
+    let trace = place.path("out/traces/glass.arrow");
+    let good = fs::read(&trace).unwrap();
+    place.good(&["capture", "builtin:ramps", "-o", "out/traces/glass.arrow", "--size", "40x33"]);
+    let (code, error) = place.bad(&["report", "out"]);
+    assert!(code == 1 && error.contains("not the trace that scene 'glass' was"), "{error}");
+    fs::write(&trace, good).unwrap();
+    place.good(&["report", "out"]);
+}
+
+#[test]
+fn names_that_differ_in_case_alone_are_refused() {
+    let place = with_study(&[("name = 'ramps'", "name = 'Glass'")]);
+    let (code, error) = place.bad(&["study", "s.toml", "-o", "out"]);
+    assert!(code == 2 && error.contains("'glass' and 'Glass' differ in case alone"), "{error}");
+    assert!(!place.path("out").exists());
+}
+
+#[test]
+fn who_loses_a_race_for_a_folder_is_told_of_it() {
+    let place = with_study(&[]);
+    // As it is when another program has the lock and has not written the study yet.
+    fs::create_dir_all(place.path("out/runs")).unwrap();
+    let lock = fs::File::create(place.path("out/.lock")).unwrap();
+    lock.lock().unwrap();
+    let (code, error) = place.bad(&["study", "s.toml", "-o", "out"]);
+    assert!(code == 2 && error.contains("another screendoor is at work in out"), "{error}");
+    lock.unlock().unwrap();
+    drop(lock);
+    // Many at once: one measures, the others are told, and nobody is told anything else.
+    let start = || {
+        Command::new(PROGRAM)
+            .args(["study", "s.toml", "-o", "race", "--shard", "1/16"])
+            .current_dir(place.0.path())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap()
+    };
+    let all: Vec<_> = (0..6).map(|_| start()).collect();
+    let mut good = 0;
+    for child in all {
+        let output = child.wait_with_output().unwrap();
+        let error = String::from_utf8_lossy(&output.stderr).to_string();
+        good += u32::from(output.status.success());
+        let told = error.contains("another screendoor is at work in race");
+        assert!(output.status.success() || told, "{error}");
+    }
+    assert!(good > 0);
 }
 
 #[test]

@@ -250,7 +250,7 @@ fn reproduce_says_how_long_it_takes_and_keeps_out_of_other_folders() {
 
 /// Starts the program, waits until `begun`, interrupts it and returns what it said.
 #[cfg(unix)]
-fn interrupted(place: &Workplace, arguments: &[&str], begun: impl Fn() -> bool) -> String {
+fn interrupted(place: &Workplace, arguments: &[&str], begun: impl Fn(u32) -> bool) -> String {
     let mut child = Command::new(PROGRAM)
         .args(arguments)
         .current_dir(place.0.path())
@@ -259,8 +259,9 @@ fn interrupted(place: &Workplace, arguments: &[&str], begun: impl Fn() -> bool) 
         .spawn()
         .unwrap();
     let pause = || std::thread::sleep(std::time::Duration::from_millis(20));
-    (0..3000).take_while(|_| !begun()).for_each(|_| pause());
-    let id = child.id().to_string();
+    let id = child.id();
+    (0..3000).take_while(|_| !begun(id)).for_each(|_| pause());
+    let id = id.to_string();
     // What ignores an interruption (started with &) heeds this.
     assert!(Command::new("kill").args(["-TERM", &id]).status().unwrap().success());
     (0..3000).take_while(|_| child.try_wait().unwrap().is_none()).for_each(|_| pause());
@@ -273,7 +274,7 @@ fn interrupted(place: &Workplace, arguments: &[&str], begun: impl Fn() -> bool) 
 #[cfg(unix)]
 fn an_interrupted_command_says_what_is_kept() {
     let place = Workplace::new();
-    let partial = || files(place.0.path()).iter().any(|name| name.ends_with(".partial"));
+    let partial = |id| place.has_begun(id);
     let capture =
         ["capture", "builtin:layers:count=100000", "-o", "big.arrow", "--size", "600x600"];
     let said = interrupted(&place, &capture, partial);
@@ -283,7 +284,7 @@ fn an_interrupted_command_says_what_is_kept() {
 
     let long = STUDY.replace("seeds = 2", "seeds = 100000").replace("['lk']", "['exact', 'lk']");
     fs::write(place.path("s.toml"), long).unwrap();
-    let one = || place.path("out/runs/r.4.exact.json").exists();
+    let one = |_| place.path("out/runs/r.4.exact.json").exists();
     let said = interrupted(&place, &["study", "s.toml", "-o", "out"], one);
     let kept = "interrupted: 1 of 2 runs are kept; the same command goes on with the others";
     assert!(said.contains(kept), "{said}");
