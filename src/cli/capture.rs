@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::capture::{CrossCheck, GpuCapture};
 use crate::output::OutputFile;
-use crate::scene::{self, Scene};
+use crate::scene::{self, LoadOptions, Scene};
 use crate::trace::{
     ColourFormat, ColumnId, Compression, Header, Scalar, TraceWriter, WriteOptions, Written,
 };
@@ -44,12 +44,15 @@ pub(super) struct Arguments {
     /// Opacity in place of the materials' own; texture alphas still multiply it
     #[arg(long, value_name = "A", allow_negative_numbers = true)]
     alpha: Option<f32>,
-    /// A PNG or JPEG for surfaces that have no texture
+    /// A picture (PNG, JPEG, WebP, BMP, TGA) for surfaces that have no texture
     #[arg(long, value_name = "FILE")]
     texture: Option<PathBuf>,
     /// Make every surface white, keeping alphas
     #[arg(long)]
     white: bool,
+    /// Open files outside the scene's folder too, where the scene names them
+    #[arg(long)]
+    allow_outside: bool,
     /// The order in which triangles are drawn
     #[arg(long, default_value = "api", value_parser = option::<Order>())]
     order: Order,
@@ -123,7 +126,8 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let file = OutputFile::create(&arguments.output)?;
     let json = arguments.json.open()?;
     let loading = console.progress("loading the scene", "");
-    let mut scene = scene::load(source)?;
+    let options = LoadOptions { allow_outside: arguments.allow_outside };
+    let mut scene = scene::load_with(source, options)?;
     drop(loading);
     if let Some(texture) = &arguments.texture {
         scene.apply_texture(texture)?;

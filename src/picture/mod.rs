@@ -1,9 +1,11 @@
 //! Pictures: linear colours of a frame's pixels, held tile by tile.
 
+mod png_chunks;
 mod read;
 pub mod srgb;
 mod write;
 
+pub(crate) use png_chunks::necessary_chunks;
 pub(crate) use read::can_hold;
 pub use read::read;
 pub use write::{Layer, PictureFile, write_exr, write_png};

@@ -7,7 +7,7 @@ use image::ImageDecoder;
 
 use crate::error::{Error, Result};
 use crate::picture::write::{check_size, exr_error};
-use crate::picture::{Picture, srgb};
+use crate::picture::{Picture, necessary_chunks, srgb};
 use crate::tile::TileGrid;
 
 /// Reads the picture in an EXR file (its layer `layer`, or the first) or in a
@@ -37,6 +37,7 @@ fn read_png(path: &Path, bytes: &[u8]) -> Result<Picture> {
     let bad = |e: &dyn std::fmt::Display| {
         Error::invalid(path.display(), format_args!("it cannot be read as PNG ({e})"), "replace it")
     };
+    let bytes = &*necessary_chunks(bytes);
     let mut reader = image::ImageReader::new(std::io::Cursor::new(bytes));
     reader.set_format(image::ImageFormat::Png);
     let mut limits = image::Limits::no_limits();

@@ -7,9 +7,12 @@
 pub mod builtin;
 mod bytes;
 mod file;
+mod folder;
 mod gltf_file;
+mod image_file;
 mod material;
 mod obj_file;
+mod polygon;
 mod source;
 mod splat_file;
 mod sprite;
@@ -27,6 +30,7 @@ pub use material::{AlphaMode, Material, TextureUse};
 pub use texture::{Texture, Wrap};
 
 use crate::error::{Error, Result};
+use crate::scene::folder::Folder;
 use crate::scene::source::{BUILTIN, ending, no_builtin, no_scene};
 
 /// The most texels of all textures of a scene that were read from files: 11 bytes
@@ -403,26 +407,44 @@ fn check_mesh(mesh: &Mesh, place: &str) -> Result<()> {
     Ok(())
 }
 
+/// How a scene is loaded.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LoadOptions {
+    /// Whether a scene's file may name files outside its own folder.
+    pub allow_outside: bool,
+}
+
 /// Loads the scene that `source` names: `builtin:NAME[:key=value,…]`, or a file
-/// whose ending says its format.
+/// whose ending says its format. Nothing outside the file's folder is opened.
 ///
 /// # Errors
 /// [`Error::Config`] for an unknown built-in or ending, [`Error::Io`] where the
 /// file cannot be read, [`Error::Invalid`] where it is damaged or holds nothing
 /// to draw.
 pub fn load(source: &str) -> Result<Scene> {
+    load_with(source, LoadOptions::default())
+}
+
+/// As [`load`], with options.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_with(source: &str, options: LoadOptions) -> Result<Scene> {
     let mut scene = match source.strip_prefix(BUILTIN) {
         Some(spec) => builtin::build(spec).map_err(|e| no_builtin(source, e))?,
         None => {
             let path = Path::new(source);
-            match ending(path).as_str() {
-                "obj" => obj_file::load(path)?,
-                "gltf" | "glb" => gltf_file::load(path)?,
+            let folder = Folder::of(path, options.allow_outside);
+            let mut scene = match ending(path).as_str() {
+                "obj" => obj_file::load(path, &folder)?,
+                "gltf" | "glb" => gltf_file::load(path, &folder)?,
                 "vdb" => vdb_file::load(path)?,
                 "ply" => splat_file::load(path)?,
                 "tfx" => tfx_file::load(path)?,
                 _ => return Err(no_scene(source)),
-            }
+            };
+            folder.tell(&mut scene);
+            scene
         }
     };
     if scene.materials.is_empty() {

@@ -1,0 +1,304 @@
+//! Which files a scene's own files may name: one rule for all formats.
+//!
+//! A scene may come from a stranger. What it names is opened only in or below the folder
+//! of the scene's file: neither absolute paths nor `..`, links, drives or network paths lead
+//! out of it. The operating system resolves the path beneath the open folder (`cap-std`), so
+//! that nothing can be exchanged between a check and its use.
+//!
+//! Exporters write paths of the machine they ran on. A name that is not there, or leads out,
+//! is looked for by its last parts inside the folder, whatever the case of its letters; the
+//! user is told which file was taken.
+
+use std::cell::{Cell, OnceCell, RefCell};
+use std::fs::File;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use cap_std::ambient_authority;
+use cap_std::fs::{Dir, OpenOptions};
+
+use crate::error::{Error, Result, one_line};
+use crate::scene::{Scene, file, file_name};
+
+/// How deep below the folder names are looked for, and among how many entries in all.
+const MAX_DEPTH: usize = 4;
+const MAX_ENTRIES: usize = 1 << 18;
+
+/// The folder of a scene's file, through which all other files are opened.
+pub(super) struct Folder {
+    /// The scene's file, for warnings.
+    source: String,
+    path: PathBuf,
+    allow_outside: bool,
+    /// The folder, open; only scenes that name files need it.
+    dir: OnceCell<Dir>,
+    /// How many more entries of folders are looked at.
+    left: Cell<usize>,
+    notes: RefCell<Vec<String>>,
+}
+
+/// A file that a scene names, open.
+pub(super) struct Found {
+    /// Where it is.
+    pub path: PathBuf,
+    file: (File, u64),
+}
+
+impl Found {
+    /// The file and its length in bytes.
+    pub fn into_file(self) -> (File, u64) {
+        self.file
+    }
+
+    /// All of its bytes.
+    ///
+    /// # Errors
+    /// As [`file::read`].
+    pub fn read(self) -> Result<Vec<u8>> {
+        file::whole(self.file, &self.path)
+    }
+}
+
+impl Folder {
+    /// The folder of the scene's file at `scene`.
+    pub fn of(scene: &Path, allow_outside: bool) -> Self {
+        let parent = scene.parent().filter(|parent| !parent.as_os_str().is_empty());
+        Folder {
+            source: file_name(scene),
+            path: parent.unwrap_or(Path::new(".")).to_path_buf(),
+            allow_outside,
+            dir: OnceCell::new(),
+            left: Cell::new(MAX_ENTRIES),
+            notes: RefCell::default(),
+        }
+    }
+
+    /// Opens the regular file that the scene calls `name`: with slashes of either kind, in
+    /// quotes or not, with a comment behind it or not.
+    ///
+    /// # Errors
+    /// [`Error::Io`] where there is none, [`Error::Invalid`] where the name leads out of the
+    /// folder and nothing inside is called so.
+    pub fn open(&self, name: &str) -> Result<Found> {
+        let spellings = spellings(name);
+        let mut first = None;
+        for spelling in &spellings {
+            match self.open_exactly(spelling) {
+                Ok(found) => return Ok(found),
+                Err(e) if is_elsewhere(&e) => first = first.or(Some(e)),
+                Err(e) => return Err(self.failed(spelling, e)),
+            }
+        }
+        let plain = &spellings[spellings.len() - 1];
+        if let Some(found) = self.search(plain) {
+            let (source, name) = (&self.source, shown(name));
+            let inside = found.path.strip_prefix(&self.path).unwrap_or(&found.path).display();
+            let note = format!(
+                "{source}: '{name}' is not there or leads out of the scene's folder; \
+                 '{}' in it is used",
+                one_line(inside)
+            );
+            if !self.notes.borrow().contains(&note) {
+                self.notes.borrow_mut().push(note);
+            }
+            return Ok(found);
+        }
+        let error = first.unwrap_or_else(|| io::ErrorKind::NotFound.into());
+        if is_escape(&error) || (leads_out(plain) && !self.allow_outside) {
+            return Err(Error::invalid(
+                format_args!("'{}'", shown(name)),
+                "it leads out of the scene's folder, and nothing in it is called so",
+                "put the file beside the scene, or capture with --allow-outside",
+            ));
+        }
+        Err(self.failed(&spellings[0], error))
+    }
+
+    /// Whether there is a regular file of just that name.
+    pub fn has(&self, name: &str) -> bool {
+        spellings(name).iter().any(|spelling| self.open_exactly(spelling).is_ok())
+    }
+
+    /// What the user should know of the files that were opened.
+    pub fn tell(&self, scene: &mut Scene) {
+        scene.warnings.append(&mut self.notes.borrow_mut());
+    }
+
+    fn failed(&self, name: &str, error: io::Error) -> Error {
+        Error::io("read", self.path.join(one_line(name)), error)
+    }
+
+    fn dir(&self) -> io::Result<&Dir> {
+        if let Some(dir) = self.dir.get() {
+            return Ok(dir);
+        }
+        let dir = Dir::open_ambient_dir(&self.path, ambient_authority())?;
+        Ok(self.dir.get_or_init(|| dir))
+    }
+
+    fn open_exactly(&self, name: &str) -> io::Result<Found> {
+        if name.is_empty() {
+            return Err(io::Error::other("the name is empty: name a file"));
+        }
+        let path = self.path.join(name);
+        if self.allow_outside {
+            return match file::open(&path) {
+                Ok(file) => Ok(Found { path, file }),
+                Err(Error::Io { source, .. }) => Err(source),
+                Err(other) => Err(io::Error::other(other)),
+            };
+        }
+        Ok(Found { file: open_in(self.dir()?, Path::new(name))?, path })
+    }
+
+    /// The file inside that has as many as possible of the name's last parts, or else
+    /// its last one in some folder below.
+    fn search(&self, name: &str) -> Option<Found> {
+        let name = name.replace('\\', "/");
+        let parts: Vec<&str> = name.split('/').filter(|p| !p.is_empty() && *p != ".").collect();
+        let from = parts.iter().rposition(|p| *p == ".." || p.ends_with(':')).map_or(0, |i| i + 1);
+        let parts = &parts[from..];
+        let dir = self.dir().ok()?;
+        let mut left = self.left.get();
+        let by_parts = (0..parts.len()).find_map(|skip| walk(dir, &parts[skip..], &mut left));
+        let path = by_parts.or_else(|| below(dir, parts.last()?, &mut left));
+        self.left.set(left);
+        let path = path?;
+        let file = open_in(dir, &path).ok()?;
+        Some(Found { path: self.path.join(path), file })
+    }
+}
+
+/// Opens a regular file beneath `dir`.
+fn open_in(dir: &Dir, path: &Path) -> io::Result<(File, u64)> {
+    let mut options = OpenOptions::new();
+    options.read(true);
+    #[cfg(unix)]
+    cap_std::fs::OpenOptionsExt::custom_flags(&mut options, file::NO_WAITING);
+    file::regular(dir.open_with(path, &options)?.into_std())
+}
+
+/// What a name may stand for, the likeliest first and the barest last.
+fn spellings(name: &str) -> Vec<String> {
+    let name = name.trim();
+    let bare = match name.split_once(" #") {
+        Some((before, _)) => before.trim_end(),
+        None => name,
+    };
+    let unquoted = |quote: char| bare.strip_prefix(quote)?.strip_suffix(quote);
+    let bare = unquoted('"').or_else(|| unquoted('\'')).unwrap_or(bare).trim();
+    let mut all = vec![name.to_string(), bare.to_string(), bare.replace('\\', "/")];
+    all.dedup();
+    all
+}
+
+/// Whether an error says that the file may be found by another name.
+fn is_elsewhere(error: &io::Error) -> bool {
+    use io::ErrorKind::{InvalidFilename, InvalidInput, NotADirectory, NotFound};
+    is_escape(error)
+        || matches!(error.kind(), NotFound | NotADirectory | InvalidInput | InvalidFilename)
+}
+
+/// Whether the path led out of the folder: what `cap-std` says has no system's number.
+fn is_escape(error: &io::Error) -> bool {
+    error.kind() == io::ErrorKind::PermissionDenied && error.raw_os_error().is_none()
+}
+
+/// Whether a name means a place that is no folder's inside: an absolute path, a drive, a
+/// network's or a URL, or one that climbs out.
+fn leads_out(name: &str) -> bool {
+    let name = name.replace('\\', "/");
+    let mut depth = 0_i64;
+    let climbs = name.split('/').any(|part| {
+        depth += match part {
+            "" | "." => 0,
+            ".." => -1,
+            _ => 1,
+        };
+        depth < 0
+    });
+    let drive = name.as_bytes().get(1) == Some(&b':');
+    climbs || drive || name.starts_with('/') || name.contains("://")
+}
+
+/// The names in a folder, in order; as many as are left to look at.
+fn names(dir: &Dir, left: &mut usize) -> Vec<(String, bool)> {
+    let Ok(entries) = dir.entries() else { return Vec::new() };
+    let mut names = Vec::new();
+    for entry in entries.flatten().take(*left) {
+        *left = left.saturating_sub(1);
+        let is_dir = entry.file_type().is_ok_and(|kind| kind.is_dir());
+        if let Ok(name) = entry.file_name().into_string() {
+            names.push((name, is_dir));
+        }
+    }
+    names.sort_unstable();
+    names
+}
+
+/// The name among `names` that is `wanted`, in other letters where there is none in these.
+fn same_name<'a>(names: &'a [(String, bool)], wanted: &str) -> Option<&'a str> {
+    let lower = wanted.to_lowercase();
+    let exact = names.iter().find(|(name, _)| name == wanted);
+    exact.or_else(|| names.iter().find(|(name, _)| name.to_lowercase() == lower)).map(|n| &*n.0)
+}
+
+/// The path of the regular file that `parts` name from `dir` on, whatever the case of letters.
+fn walk(dir: &Dir, parts: &[&str], left: &mut usize) -> Option<PathBuf> {
+    let (first, rest) = parts.split_first()?;
+    let entries = names(dir, left);
+    let name = same_name(&entries, first)?;
+    if rest.is_empty() {
+        return open_in(dir, Path::new(name)).is_ok().then(|| PathBuf::from(name));
+    }
+    let found = walk(&dir.open_dir(name).ok()?, rest, left)?;
+    Some(Path::new(name).join(found))
+}
+
+/// The path of a regular file of that name in some folder below `dir`, the nearest first.
+fn below(dir: &Dir, name: &str, left: &mut usize) -> Option<PathBuf> {
+    let mut level = vec![PathBuf::new()];
+    for _ in 0..MAX_DEPTH {
+        let mut next = Vec::new();
+        for folder in level {
+            let opened =
+                if folder.as_os_str().is_empty() { dir.try_clone() } else { dir.open_dir(&folder) };
+            let Ok(opened) = opened else { continue };
+            let entries = names(&opened, left);
+            if let Some(found) = same_name(&entries, name)
+                && open_in(&opened, Path::new(found)).is_ok()
+            {
+                return Some(folder.join(found));
+            }
+            let folders = entries.into_iter().filter(|(_, is_dir)| *is_dir);
+            next.extend(folders.map(|(name, _)| folder.join(name)));
+        }
+        level = next;
+    }
+    None
+}
+
+/// A name as messages show it.
+fn shown(name: &str) -> String {
+    one_line(name.chars().take(200).collect::<String>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_that_lead_out_are_known() {
+        let out = ["/a", "\\\\server\\a", "C:\\a", "c:/a", "../a", "a/../../b", "..", "http://x/a"];
+        let inside = ["a", "./a", "a/b", "a/../b", "a\\b", "a..b", "..a"];
+        assert!(out.iter().all(|name| leads_out(name)));
+        assert!(!inside.iter().any(|name| leads_out(name)));
+    }
+
+    #[test]
+    fn a_name_is_spelt_without_quotes_comments_and_backslashes() {
+        assert_eq!(spellings("a.png"), ["a.png"]);
+        assert_eq!(spellings("\"a b.png\""), ["\"a b.png\"", "a b.png"]);
+        assert_eq!(spellings("a\\b.png # leaf"), ["a\\b.png # leaf", "a\\b.png", "a/b.png"]);
+    }
+}
