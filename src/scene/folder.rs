@@ -10,6 +10,7 @@
 //! user is told which file was taken.
 
 use std::cell::{Cell, OnceCell, RefCell};
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -34,7 +35,7 @@ pub(super) struct Folder {
     dir: OnceCell<Dir>,
     /// How many more entries of folders are looked at.
     left: Cell<usize>,
-    notes: RefCell<Vec<String>>,
+    notes: RefCell<BTreeSet<String>>,
 }
 
 /// A file that a scene names, open.
@@ -62,10 +63,9 @@ impl Found {
 impl Folder {
     /// The folder of the scene's file at `scene`.
     pub fn of(scene: &Path, allow_outside: bool) -> Self {
-        let parent = scene.parent().filter(|parent| !parent.as_os_str().is_empty());
         Folder {
             source: file_name(scene),
-            path: parent.unwrap_or(Path::new(".")).to_path_buf(),
+            path: scene.parent().unwrap_or(Path::new("")).to_path_buf(),
             allow_outside,
             dir: OnceCell::new(),
             left: Cell::new(MAX_ENTRIES),
@@ -98,9 +98,7 @@ impl Folder {
                  '{}' in it is used",
                 one_line(inside)
             );
-            if !self.notes.borrow().contains(&note) {
-                self.notes.borrow_mut().push(note);
-            }
+            self.notes.borrow_mut().insert(note);
             return Ok(found);
         }
         let error = first.unwrap_or_else(|| io::ErrorKind::NotFound.into());
@@ -121,7 +119,7 @@ impl Folder {
 
     /// What the user should know of the files that were opened.
     pub fn tell(&self, scene: &mut Scene) {
-        scene.warnings.append(&mut self.notes.borrow_mut());
+        scene.warnings.extend(self.notes.take());
     }
 
     fn failed(&self, name: &str, error: io::Error) -> Error {
@@ -132,7 +130,9 @@ impl Folder {
         if let Some(dir) = self.dir.get() {
             return Ok(dir);
         }
-        let dir = Dir::open_ambient_dir(&self.path, ambient_authority())?;
+        let here = self.path.as_os_str().is_empty();
+        let path = if here { Path::new(".") } else { &self.path };
+        let dir = Dir::open_ambient_dir(path, ambient_authority())?;
         Ok(self.dir.get_or_init(|| dir))
     }
 

@@ -97,9 +97,8 @@ fn holds(format: ImageFormat, bytes: &[u8], width: u32, height: u32) -> bool {
 /// What else they are.
 fn format(bytes: &[u8], place: &str) -> Result<ImageFormat, String> {
     let read = "PNG, JPEG, WebP, BMP and TGA are read";
-    match other_format(bytes) {
-        Some(name) => return Err(format!("it is a {name}; {read}")),
-        None => {}
+    if let Some(name) = other_format(bytes) {
+        return Err(format!("it is a {name}; {read}"));
     }
     match image::guess_format(bytes) {
         Ok(format) if FORMATS.contains(&format) => Ok(format),

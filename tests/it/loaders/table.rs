@@ -80,7 +80,6 @@ fn every_row_is_kept() {
             ("read" | "approximated", Shows(files, check)) => {
                 let scene = load(&files).unwrap_or_else(|e| panic!("{place}: {e}"));
                 assert_eq!(scene.warnings, [""; 0], "{place}");
-                eprintln!("{place}");
                 check(&scene);
             }
             ("passed", Like(files, others)) => {
