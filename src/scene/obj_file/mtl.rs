@@ -301,14 +301,14 @@ impl<'a> Library<'a> {
             scene.objects.iter().map(name).filter(|n| self.clear.contains_key(*n)).collect();
         let Some(first) = clear.first() else { return };
         let all = scene.objects.iter().all(|o| clear.contains(name(o)));
-        let what = if all {
-            "the whole scene is".to_string()
-        } else {
-            format!("{} materials are", clear.len())
+        let what = match clear.len() {
+            _ if all => "the whole scene is".to_string(),
+            1 => "a material is".to_string(),
+            n => format!("{n} materials are"),
         };
         let warning = format!(
-            "{}: {what} transparent and not drawn, as {} says of '{first}'; where opaque is meant, \
-             write 'd 1' in its place (some programs write 'Tr 1' for it)",
+            "{}: {what} transparent: {} says so of '{first}'; where opaque is meant, write 'd 1' \
+             in its place (some programs write 'Tr 1' for it)",
             scene.source, self.clear[*first]
         );
         scene.warnings.push(warning);
