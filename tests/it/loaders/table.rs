@@ -131,13 +131,10 @@ fn saw(corners: usize) -> String {
     text + "f" + &(1..=corners).map(|i| format!(" {i}")).collect::<String>() + "\n"
 }
 
-/// A polygon around the origin.
+/// A convex polygon: corners on a parabola.
 fn round(corners: usize) -> String {
     let mut text = String::new();
-    for i in 0..corners {
-        let (sine, cosine) = (i as f64 / corners as f64 * std::f64::consts::TAU).sin_cos();
-        writeln!(text, "v {cosine} {sine} 0").unwrap();
-    }
+    (0..corners).for_each(|i| writeln!(text, "v {i} {} 0", i * i).unwrap());
     text + "f" + &(1..=corners).map(|i| format!(" {i}")).collect::<String>() + "\n"
 }
 
@@ -560,7 +557,7 @@ fn texture_cases() -> Vec<Case> {
         five.push((name, encoded(format, [255; 4])));
     }
     let mut claims = encoded(ImageFormat::Bmp, [255; 4]);
-    claims[18..26].copy_from_slice(&[9999_u32.to_le_bytes(), 1_u32.to_le_bytes()].concat());
+    claims[18..26].copy_from_slice(&[9999_u32.to_le_bytes(), 9_u32.to_le_bytes()].concat());
     let plain = png(image::RgbaImage::from_pixel(2, 2, image::Rgba([9, 9, 9, 99])));
     vec![
         case(
@@ -584,7 +581,7 @@ fn texture_cases() -> Vec<Case> {
         ),
         case(
             "more texels than the file can hold",
-            Says(named("a.bmp", claims), "bytes hold no 9999 x 1"),
+            Says(named("a.bmp", claims), "bytes hold no 9999 x 9"),
         ),
     ]
 }
