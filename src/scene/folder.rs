@@ -10,10 +10,11 @@
 //! user is told which file was taken.
 
 use std::cell::{Cell, OnceCell, RefCell};
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 use cap_std::ambient_authority;
 use cap_std::fs::{Dir, OpenOptions};
@@ -21,9 +22,11 @@ use cap_std::fs::{Dir, OpenOptions};
 use crate::error::{Error, Result, one_line};
 use crate::scene::{Scene, file, file_name};
 
-/// How deep below the folder names are looked for, and among how many entries in all.
+/// How deep below the folder names are looked for.
 const MAX_DEPTH: usize = 4;
-const MAX_ENTRIES: usize = 1 << 18;
+/// How many entries of folders are read, and how many are looked at, for all names together.
+const MAX_ENTRIES: usize = 1 << 17;
+const MAX_LOOKED_AT: usize = 1 << 25;
 
 /// The folder of a scene's file, through which all other files are opened.
 pub(super) struct Folder {
@@ -33,9 +36,19 @@ pub(super) struct Folder {
     allow_outside: bool,
     /// The folder, open; only scenes that name files need it.
     dir: OnceCell<Dir>,
-    /// How many more entries of folders are looked at.
-    left: Cell<usize>,
+    /// The entries of folders below, by their paths from here.
+    listings: RefCell<HashMap<PathBuf, Rc<Vec<Entry>>>>,
+    /// How many more entries are read, and looked at.
+    left: Cell<[usize; 2]>,
     notes: RefCell<BTreeSet<String>>,
+}
+
+/// An entry of a folder.
+struct Entry {
+    name: String,
+    /// In small letters.
+    lower: String,
+    is_dir: bool,
 }
 
 /// A file that a scene names, open.
@@ -68,7 +81,8 @@ impl Folder {
             path: scene.parent().unwrap_or(Path::new("")).to_path_buf(),
             allow_outside,
             dir: OnceCell::new(),
-            left: Cell::new(MAX_ENTRIES),
+            listings: RefCell::default(),
+            left: Cell::new([MAX_ENTRIES, MAX_LOOKED_AT]),
             notes: RefCell::default(),
         }
     }
@@ -159,13 +173,70 @@ impl Folder {
         let from = parts.iter().rposition(|p| *p == ".." || p.ends_with(':')).map_or(0, |i| i + 1);
         let parts = &parts[from..];
         let dir = self.dir().ok()?;
-        let mut left = self.left.get();
-        let by_parts = (0..parts.len()).find_map(|skip| walk(dir, &parts[skip..], &mut left));
-        let path = by_parts.or_else(|| below(dir, parts.last()?, &mut left));
-        self.left.set(left);
-        let path = path?;
+        let by_parts = (0..parts.len()).find_map(|skip| self.walk(dir, &parts[skip..]));
+        let path = by_parts.or_else(|| self.below(dir, parts.last()?))?;
         let file = open_in(dir, &path).ok()?;
         Some(Found { path: self.path.join(path), file })
+    }
+
+    /// The entries of the folder at `path` from here, by name.
+    fn entries(&self, dir: &Dir, path: &Path) -> Rc<Vec<Entry>> {
+        if let Some(known) = self.listings.borrow().get(path) {
+            return known.clone();
+        }
+        let [mut left, looks] = self.left.get();
+        let mut entries = Vec::new();
+        let read = if path.as_os_str().is_empty() { dir.entries() } else { dir.read_dir(path) };
+        for entry in read.into_iter().flatten().flatten().take(left) {
+            left -= 1;
+            let is_dir = entry.file_type().is_ok_and(|kind| kind.is_dir());
+            if let Ok(name) = entry.file_name().into_string() {
+                entries.push(Entry { lower: name.to_lowercase(), name, is_dir });
+            }
+        }
+        self.left.set([left, looks]);
+        entries.sort_unstable_by(|a, b| a.name.cmp(&b.name));
+        let entries = Rc::new(entries);
+        self.listings.borrow_mut().insert(path.to_path_buf(), entries.clone());
+        entries
+    }
+
+    /// The name among `entries` that is `wanted`, in other letters where there is none in these.
+    fn same_name<'e>(&self, entries: &'e [Entry], wanted: &str) -> Option<&'e str> {
+        let [reads, looks] = self.left.get();
+        self.left.set([reads, looks.checked_sub(entries.len())?]);
+        let lower = wanted.to_lowercase();
+        let exact = entries.iter().find(|entry| entry.name == wanted);
+        exact.or_else(|| entries.iter().find(|entry| entry.lower == lower)).map(|e| &*e.name)
+    }
+
+    /// The path of the regular file that `parts` name, whatever the case of letters.
+    fn walk(&self, dir: &Dir, parts: &[&str]) -> Option<PathBuf> {
+        let mut path = PathBuf::new();
+        for part in parts {
+            let entries = self.entries(dir, &path);
+            path.push(self.same_name(&entries, part)?);
+        }
+        open_in(dir, &path).is_ok().then_some(path)
+    }
+
+    /// The path of a regular file of that name in some folder below, the nearest first.
+    fn below(&self, dir: &Dir, name: &str) -> Option<PathBuf> {
+        let mut level = vec![PathBuf::new()];
+        for _ in 0..=MAX_DEPTH {
+            let mut next = Vec::new();
+            for folder in level {
+                let entries = self.entries(dir, &folder);
+                let found = self.same_name(&entries, name).map(|found| folder.join(found));
+                if found.as_ref().is_some_and(|found| open_in(dir, found).is_ok()) {
+                    return found;
+                }
+                let folders = entries.iter().filter(|entry| entry.is_dir);
+                next.extend(folders.map(|entry| folder.join(&entry.name)));
+            }
+            level = next;
+        }
+        None
     }
 }
 
@@ -219,63 +290,6 @@ fn leads_out(name: &str) -> bool {
     });
     let drive = name.as_bytes().get(1) == Some(&b':');
     climbs || drive || name.starts_with('/') || name.contains("://")
-}
-
-/// The names in a folder, in order; as many as are left to look at.
-fn names(dir: &Dir, left: &mut usize) -> Vec<(String, bool)> {
-    let Ok(entries) = dir.entries() else { return Vec::new() };
-    let mut names = Vec::new();
-    for entry in entries.flatten().take(*left) {
-        *left = left.saturating_sub(1);
-        let is_dir = entry.file_type().is_ok_and(|kind| kind.is_dir());
-        if let Ok(name) = entry.file_name().into_string() {
-            names.push((name, is_dir));
-        }
-    }
-    names.sort_unstable();
-    names
-}
-
-/// The name among `names` that is `wanted`, in other letters where there is none in these.
-fn same_name<'a>(names: &'a [(String, bool)], wanted: &str) -> Option<&'a str> {
-    let lower = wanted.to_lowercase();
-    let exact = names.iter().find(|(name, _)| name == wanted);
-    exact.or_else(|| names.iter().find(|(name, _)| name.to_lowercase() == lower)).map(|n| &*n.0)
-}
-
-/// The path of the regular file that `parts` name from `dir` on, whatever the case of letters.
-fn walk(dir: &Dir, parts: &[&str], left: &mut usize) -> Option<PathBuf> {
-    let (first, rest) = parts.split_first()?;
-    let entries = names(dir, left);
-    let name = same_name(&entries, first)?;
-    if rest.is_empty() {
-        return open_in(dir, Path::new(name)).is_ok().then(|| PathBuf::from(name));
-    }
-    let found = walk(&dir.open_dir(name).ok()?, rest, left)?;
-    Some(Path::new(name).join(found))
-}
-
-/// The path of a regular file of that name in some folder below `dir`, the nearest first.
-fn below(dir: &Dir, name: &str, left: &mut usize) -> Option<PathBuf> {
-    let mut level = vec![PathBuf::new()];
-    for _ in 0..MAX_DEPTH {
-        let mut next = Vec::new();
-        for folder in level {
-            let opened =
-                if folder.as_os_str().is_empty() { dir.try_clone() } else { dir.open_dir(&folder) };
-            let Ok(opened) = opened else { continue };
-            let entries = names(&opened, left);
-            if let Some(found) = same_name(&entries, name)
-                && open_in(&opened, Path::new(found)).is_ok()
-            {
-                return Some(folder.join(found));
-            }
-            let folders = entries.into_iter().filter(|(_, is_dir)| *is_dir);
-            next.extend(folders.map(|(name, _)| folder.join(name)));
-        }
-        level = next;
-    }
-    None
 }
 
 /// A name as messages show it.

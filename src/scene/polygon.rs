@@ -19,12 +19,10 @@ use crate::random::Stream;
 
 /// Polygons of more corners are cut only where a fan of triangles covers them.
 const MAX_CORNERS: usize = 1 << 16;
-/// Crossings of edges times corners: what looking for their edges takes.
-const MAX_WORK: f64 = (1_u64 << 30) as f64;
-/// Pairs of edges that are looked at to estimate how many cross, where there are more corners
-/// than this.
-const PAIRS: u32 = 1 << 20;
-const FEW_CORNERS: usize = 1 << 10;
+/// Crossings of edges times corners, of all polygons of a scene: what finding the edges takes.
+const MAX_WORK: f64 = (1_u64 << 26) as f64;
+/// Pairs of edges for each corner that are looked at to estimate how many cross.
+const PAIRS: usize = 64;
 /// Steps of the lattice on which polygons are cut, along the longer side of their box.
 const STEPS: f64 = (1_u64 << 40) as f64;
 /// A part of a polygon's area that may be covered twice.
@@ -43,25 +41,40 @@ pub(super) enum Corner {
 #[derive(Debug, PartialEq)]
 pub(super) struct TooComplex;
 
-/// The triangles of the polygon with these corners; they turn as it does. A polygon without
-/// area gives triangles without area.
-///
-/// # Errors
-/// [`TooComplex`] where it has more than 65536 corners, or too many crossings, and is not
-/// covered by a fan from its first corner.
-pub(super) fn triangulate(points: &[DVec3]) -> Result<Vec<[Corner; 3]>, TooComplex> {
-    let fan = || (1..points.len().max(2) - 1).map(|i| [0, i, i + 1].map(Corner::Own)).collect();
-    if points.len() <= 3 {
-        return Ok(fan());
+/// Cuts the polygons of a scene.
+pub(super) struct Cutter {
+    /// How much more crossings may take.
+    left: f64,
+}
+
+impl Default for Cutter {
+    fn default() -> Self {
+        Cutter { left: MAX_WORK }
     }
-    let Some(flat) = flattened(points) else { return Ok(fan()) };
-    if is_fan(&flat) {
-        return Ok(fan());
+}
+
+impl Cutter {
+    /// The triangles of the polygon with these corners; they turn as it does. A polygon without
+    /// area gives triangles without area.
+    ///
+    /// # Errors
+    /// [`TooComplex`] where it has more than 65536 corners, or it and the polygons before it too
+    /// many crossings, and is not covered by a fan from its first corner.
+    pub fn triangulate(&mut self, points: &[DVec3]) -> Result<Vec<[Corner; 3]>, TooComplex> {
+        let fan = || (1..points.len().max(2) - 1).map(|i| [0, i, i + 1].map(Corner::Own)).collect();
+        if points.len() <= 3 {
+            return Ok(fan());
+        }
+        let Some(flat) = flattened(points) else { return Ok(fan()) };
+        if is_fan(&flat) {
+            return Ok(fan());
+        }
+        if flat.len() > MAX_CORNERS {
+            return Err(TooComplex);
+        }
+        self.left -= crossings(&flat) * (flat.len() + PAIRS) as f64;
+        if self.left < 0.0 { Err(TooComplex) } else { Ok(cut(&flat)) }
     }
-    if flat.len() > MAX_CORNERS || crossings(&flat) * flat.len() as f64 > MAX_WORK {
-        return Err(TooComplex);
-    }
-    Ok(cut(&flat))
 }
 
 /// The polygon in its best plane, seen so that it turns counter-clockwise; `None` where it has
@@ -119,21 +132,24 @@ fn is_fan(flat: &[DVec2]) -> bool {
     turned <= std::f64::consts::TAU * (1.0 + NO_AREA)
 }
 
-/// About how often edges cross each other.
+/// About how often edges cross each other; exactly where there are few.
 fn crossings(flat: &[DVec2]) -> f64 {
     let count = flat.len();
-    if count <= FEW_CORNERS {
-        return 0.0;
+    let edge = |i: usize| (flat[i], flat[(i + 1) % count]);
+    let cross = |i: usize, j: usize| {
+        let (a, b) = (edge(i), edge(j));
+        let side = |(p, q): (DVec2, DVec2), r: DVec2| (q - p).perp_dot(r - p);
+        side(a, b.0) * side(a, b.1) < 0.0 && side(b, a.0) * side(b, a.1) < 0.0
+    };
+    let pairs = count * count / 2;
+    if pairs <= PAIRS * count {
+        let all = (0..count).flat_map(|i| (0..i).map(move |j| (i, j)));
+        return all.filter(|(i, j)| cross(*i, *j)).count() as f64;
     }
     let mut random = Stream::new([0x901, count as u32]);
-    let edge = |i: usize| (flat[i], flat[(i + 1) % count]);
-    let crossing = (0..PAIRS).filter(|_| {
-        let [a, b] = [(); 2].map(|()| edge(random.below(count as u32) as usize));
-        let sides = |(p, q): (DVec2, DVec2), r: DVec2| (q - p).perp_dot(r - p);
-        sides(a, b.0) * sides(a, b.1) < 0.0 && sides(b, a.0) * sides(b, a.1) < 0.0
-    });
-    let pairs = count as f64 * count as f64 / 2.0;
-    crossing.count() as f64 / f64::from(PAIRS) * pairs
+    let mut any = || random.below(count as u32) as usize;
+    let found = (0..PAIRS * count).filter(|_| cross(any(), any())).count();
+    found as f64 / (PAIRS * count) as f64 * pairs as f64
 }
 
 /// Cuts any polygon, by the even-odd rule.
@@ -197,6 +213,10 @@ fn on_edge(contour: &[IntPoint<i64>], at: DVec2) -> Corner {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn triangulate(points: &[DVec3]) -> Result<Vec<[Corner; 3]>, TooComplex> {
+        Cutter::default().triangulate(points)
+    }
 
     fn polygon(corners: &[[f64; 2]]) -> Vec<DVec3> {
         corners.iter().map(|[x, y]| DVec3::new(*x, *y, 0.0)).collect()
@@ -355,6 +375,11 @@ mod tests {
         let mut side = || f64::from(random.range(0.0, 1.0));
         let wild: Vec<[f64; 2]> = (0..20_000).map(|_| [side(), side()]).collect();
         assert_eq!(triangulate(&polygon(&wild)), Err(TooComplex));
+        // Nor what takes too long together.
+        let mut cutter = Cutter::default();
+        let some = polygon(&wild[..200]);
+        let done = (0..1000).take_while(|_| cutter.triangulate(&some).is_ok()).count();
+        assert!((1..1000).contains(&done), "{done}");
         // As many corners that do not cross are cut.
         let comb: Vec<[f64; 2]> = (0..20_000_u32)
             .map(|i| {

@@ -8,7 +8,7 @@ use super::geometry::{Face, Geometry, Segment};
 use crate::error::{Error, Result};
 use crate::picture::srgb;
 use crate::scene::Mesh;
-use crate::scene::polygon::{Corner, triangulate};
+use crate::scene::polygon::{Corner, Cutter};
 
 /// A scene further from the origin than this many times its size is moved there before its
 /// places are rounded to single precision.
@@ -24,6 +24,7 @@ pub(super) struct Builder<'a> {
     pub origin: DVec3,
     /// Faces of smoothing groups that have no normals.
     pub flat: usize,
+    cutter: Cutter,
 }
 
 impl<'a> Builder<'a> {
@@ -37,6 +38,7 @@ impl<'a> Builder<'a> {
             colours: geometry.colours.iter().map(colour).collect(),
             origin: origin(geometry),
             flat: 0,
+            cutter: Cutter::default(),
         }
     }
 
@@ -56,7 +58,8 @@ impl<'a> Builder<'a> {
             self.flat += usize::from(face.smooth && corners.iter().any(|c| c[2] == 0));
             points.clear();
             points.extend(corners.iter().map(|c| self.geometry.positions[c[0] as usize - 1]));
-            for triangle in triangulate(&points).map_err(|_| self.too_complex(face, corners))? {
+            let triangles = self.cutter.triangulate(&points);
+            for triangle in triangles.map_err(|_| self.too_complex(face, corners))? {
                 let triangle = triangle.map(|corner| match corner {
                     Corner::Own(i) => *known
                         .entry(corners[i])
