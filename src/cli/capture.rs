@@ -44,7 +44,7 @@ pub(super) struct Arguments {
     /// Opacity in place of the materials' own; texture alphas still multiply it
     #[arg(long, value_name = "A", allow_negative_numbers = true)]
     alpha: Option<f32>,
-    /// A PNG or JPEG for surfaces that have no texture
+    /// A picture (PNG, JPEG, WebP, BMP, TGA) for surfaces that have no texture
     #[arg(long, value_name = "FILE")]
     texture: Option<PathBuf>,
     /// Which grid of a .vdb file to draw: 'density' or the first fog volume where not given
@@ -56,6 +56,9 @@ pub(super) struct Arguments {
     /// Make every surface white, keeping alphas
     #[arg(long)]
     white: bool,
+    /// Open files outside the scene's folder too, where the scene names them
+    #[arg(long)]
+    allow_outside: bool,
     /// The order in which triangles are drawn
     #[arg(long, default_value = "api", value_parser = option::<Order>())]
     order: Order,
@@ -131,7 +134,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let file = OutputFile::create(&arguments.output)?;
     let json = arguments.json.open()?;
     let loading = console.progress("loading the scene", "");
-    let load = LoadOptions { grid: arguments.grid.clone() };
+    let load = LoadOptions { grid: arguments.grid.clone(), allow_outside: arguments.allow_outside };
     let mut scene = scene::load_with(source, &load)?;
     drop(loading);
     if let Some(texture) = &arguments.texture {

@@ -2,11 +2,13 @@
 
 mod exr_file;
 mod opened;
+mod png_chunks;
 mod read;
 pub mod srgb;
 mod write;
 
 pub use opened::{AlphaDifference, Laid, Opened, Window, lay};
+pub(crate) use png_chunks::necessary_chunks;
 pub(crate) use read::can_hold;
 pub use read::{layers, open, read};
 pub use write::{Layer, PictureFile, write_exr, write_png};

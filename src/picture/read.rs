@@ -7,7 +7,7 @@ use image::ImageDecoder;
 use crate::error::{Error, Result};
 use crate::picture::opened::Opened;
 use crate::picture::write::check_size;
-use crate::picture::{Picture, exr_file, srgb};
+use crate::picture::{Picture, exr_file, necessary_chunks, srgb};
 use crate::tile::TileGrid;
 
 /// Reads the picture in an EXR file (its layer or part `layer`, or the first that is a
@@ -74,6 +74,7 @@ fn read_png(path: &Path, bytes: &[u8]) -> Result<Opened> {
     let bad = |e: &dyn std::fmt::Display| {
         Error::invalid(path.display(), format_args!("it cannot be read as PNG ({e})"), "replace it")
     };
+    let bytes = &*necessary_chunks(bytes);
     let mut reader = image::ImageReader::new(std::io::Cursor::new(bytes));
     reader.set_format(image::ImageFormat::Png);
     let mut limits = image::Limits::no_limits();

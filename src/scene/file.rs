@@ -1,6 +1,6 @@
 //! Reading the files that a scene consists of.
 
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
@@ -16,11 +16,28 @@ const MAX_BYTES: u64 = 1 << 32;
 /// [`Error::Io`] where it cannot be opened or is no regular file.
 pub(super) fn open(path: &Path) -> Result<(File, u64)> {
     let fail = |e| Error::io("read", path, e);
-    let metadata = fs::metadata(path).map_err(fail)?;
-    if !metadata.is_file() {
-        return Err(fail(io::Error::other("it is no regular file: name one")));
+    let mut options = File::options();
+    options.read(true);
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::custom_flags(&mut options, NO_WAITING);
+    regular(options.open(path).map_err(fail)?).map_err(fail)
+}
+
+/// With these flags a pipe opens at once, and a terminal does not become the program's.
+#[cfg(unix)]
+pub(super) const NO_WAITING: i32 = libc::O_NONBLOCK | libc::O_NOCTTY;
+
+/// The file with its length, where it is a regular one. What is asked is the open file, which
+/// nobody can exchange.
+pub(super) fn regular(file: File) -> io::Result<(File, u64)> {
+    let metadata = file.metadata()?;
+    if metadata.is_dir() {
+        return Err(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder: name a file"));
     }
-    Ok((File::open(path).map_err(fail)?, metadata.len()))
+    if !metadata.is_file() {
+        return Err(io::Error::other("it is no regular file: name one"));
+    }
+    Ok((file, metadata.len()))
 }
 
 /// Reads a regular file whole.
@@ -28,8 +45,15 @@ pub(super) fn open(path: &Path) -> Result<(File, u64)> {
 /// # Errors
 /// As [`open`], and where it is longer than 4 GiB.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>> {
+    whole(open(path)?, path)
+}
+
+/// All bytes of an open file of that length.
+///
+/// # Errors
+/// [`Error::Io`] where it cannot be read, or is longer than 4 GiB.
+pub(super) fn whole((file, length): (File, u64), path: &Path) -> Result<Vec<u8>> {
     let fail = |e| Error::io("read", path, e);
-    let (file, length) = open(path)?;
     if length > MAX_BYTES {
         return Err(fail(io::Error::other("it is longer than 4 GiB: split it")));
     }

@@ -7,9 +7,12 @@
 pub mod builtin;
 mod bytes;
 mod file;
+mod folder;
 mod gltf_file;
+mod image_file;
 mod material;
 mod obj_file;
+mod polygon;
 mod sampling;
 mod source;
 mod splat_file;
@@ -29,6 +32,7 @@ pub use sampling::{Filter, Sampling, Wrap};
 pub use texture::Texture;
 
 use crate::error::{Error, Result};
+use crate::scene::folder::Folder;
 use crate::scene::source::{BUILTIN, ending, no_builtin, no_scene};
 
 /// The most texels of all textures of a scene that were read from files: 11 bytes
@@ -430,6 +434,8 @@ fn check_mesh(mesh: &Mesh, place: &str) -> Result<()> {
 pub struct LoadOptions {
     /// Which grid of a volume to draw; where none is named, its densities.
     pub grid: Option<String>,
+    /// Whether a scene's file may name files outside its own folder.
+    pub allow_outside: bool,
 }
 
 /// Loads the scene that `source` names, as [`load_with`] does without options.
@@ -441,7 +447,7 @@ pub fn load(source: &str) -> Result<Scene> {
 }
 
 /// Loads the scene that `source` names: `builtin:NAME[:key=value,…]`, or a file
-/// whose ending says its format.
+/// whose ending says its format. Nothing outside the file's folder is opened.
 ///
 /// # Errors
 /// [`Error::Config`] for an unknown built-in or ending, or a grid that is not there,
@@ -457,14 +463,17 @@ pub fn load_with(source: &str, options: &LoadOptions) -> Result<Scene> {
         Some(spec) => builtin::build(spec).map_err(|e| no_builtin(source, e))?,
         None => {
             let path = Path::new(source);
-            match ending(path).as_str() {
-                "obj" => obj_file::load(path)?,
-                "gltf" | "glb" => gltf_file::load(path)?,
+            let folder = Folder::of(path, options.allow_outside);
+            let mut scene = match ending(path).as_str() {
+                "obj" => obj_file::load(path, &folder)?,
+                "gltf" | "glb" => gltf_file::load(path, &folder)?,
                 "vdb" => vdb_file::load(path, options.grid.as_deref())?,
                 "ply" => splat_file::load(path)?,
                 "tfx" => tfx_file::load(path)?,
                 _ => return Err(no_scene(source)),
-            }
+            };
+            folder.tell(&mut scene);
+            scene
         }
     };
     if scene.materials.is_empty() {

@@ -3,20 +3,13 @@
 use std::path::Path;
 
 use glam::{Vec2, Vec4};
-use image::{DynamicImage, ImageDecoder, ImageReader, Limits};
+use image::DynamicImage;
 
-use crate::error::{Error, Result};
-use crate::picture::{can_hold, srgb};
+use crate::error::Result;
+use crate::picture::srgb;
 use crate::scene::file;
+use crate::scene::image_file::{self, MAX_SIDE, is_deep};
 use crate::scene::sampling::{Filter, Sampling, Wrap};
-
-/// The largest side of a texture.
-const MAX_SIDE: u32 = 16384;
-/// The most texels of a texture that is read: it takes 11 bytes a texel when
-/// loaded, and at most 8 more while it is.
-const MAX_TEXELS: u64 = 1 << 26;
-/// The most memory that the decoder may take, in bytes: 8 a texel and its own.
-const MAX_DECODE_BYTES: u64 = 1 << 30;
 
 /// What the numbers of an image file mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -102,74 +95,32 @@ impl Texture {
         Texture { sampling, ..self }
     }
 
-    /// Decodes a PNG or JPEG; colours are taken as sRGB. `place` names it in errors.
+    /// Decodes a PNG, JPEG, WebP, BMP or TGA; colours are taken as sRGB. `place` names it in errors.
     ///
     /// # Errors
-    /// [`Error::Invalid`] where it cannot be decoded, [`Error::Unsupported`] where
+    /// [`Error::Invalid`](crate::error::Error::Invalid) where it cannot be decoded,
+    /// [`Error::Unsupported`](crate::error::Error::Unsupported) where
     /// it has more than 16384 texels on a side or 64 Mi in all.
     pub fn decode(bytes: &[u8], place: &str) -> Result<Self> {
-        Self::decode_as(bytes, place, Encoding::Srgb)
+        Ok(Self::from_image(image_file::decode(bytes, place)?, Encoding::Srgb))
     }
 
-    /// Reads a PNG or JPEG file; colours are taken as sRGB.
+    /// Reads a PNG, JPEG, WebP, BMP or TGA file; colours are taken as sRGB.
     ///
     /// # Errors
-    /// [`Error::Io`] where it cannot be read or is no regular file; as
+    /// [`Error::Io`](crate::error::Error::Io) where it cannot be read or is no regular file; as
     /// [`Texture::decode`].
     pub fn read(path: &Path) -> Result<Self> {
-        Self::read_as(path, Encoding::Srgb)
+        Self::decode(&file::read(path)?, &path.display().to_string())
     }
 
-    /// As [`Texture::read`], with numbers that mean what `encoding` says.
-    ///
-    /// # Errors
-    /// As [`Texture::read`].
-    pub(super) fn read_as(path: &Path, encoding: Encoding) -> Result<Self> {
-        Self::decode_as(&file::read(path)?, &path.display().to_string(), encoding)
-    }
-
-    /// As [`Texture::decode`], with numbers that mean what `encoding` says.
-    ///
-    /// # Errors
-    /// As [`Texture::decode`].
-    pub(super) fn decode_as(bytes: &[u8], place: &str, encoding: Encoding) -> Result<Self> {
-        let bad = |e: &dyn std::fmt::Display| {
-            Error::invalid(place, format_args!("the texture cannot be decoded ({e})"), "replace it")
-        };
-        let reader = ImageReader::new(std::io::Cursor::new(bytes));
-        let mut reader = reader.with_guessed_format().map_err(|e| bad(&e))?;
-        let mut limits = Limits::no_limits();
-        limits.max_alloc = Some(MAX_DECODE_BYTES);
-        reader.limits(limits);
-        let decoder = reader.into_decoder().map_err(|e| bad(&e))?;
-        let (width, height) = decoder.dimensions();
-        if width == 0 || height == 0 {
-            return Err(bad(&"it has no texels"));
-        }
-        if width.max(height) > MAX_SIDE || u64::from(width) * u64::from(height) > MAX_TEXELS {
-            let what = format_args!(
-                "the texture has {width} x {height} texels, and {MAX_SIDE} on a side and \
-                 {MAX_TEXELS} in all are the most"
-            )
-            .to_string();
-            return Err(Error::unsupported(place, what, "scale it down"));
-        }
-        if !can_hold(bytes, width, height) {
-            return Err(bad(&format_args!(
-                "{} bytes hold no {width} x {height} texels",
-                bytes.len()
-            )));
-        }
-        let image = DynamicImage::from_decoder(decoder).map_err(|e| bad(&e))?;
-        Ok(Self::from_image(image, encoding))
-    }
-
-    fn from_image(image: DynamicImage, encoding: Encoding) -> Self {
+    /// The texture of a decoded picture.
+    pub(super) fn from_image(image: DynamicImage, encoding: Encoding) -> Self {
         let (width, height) = (image.width(), image.height());
         // Decodes a channel that is not alpha.
         let decode = |v: f64| if encoding.is_srgb() { srgb::decode(v) as f32 } else { v as f32 };
         let alpha = |v: f32| if encoding.is_opaque() { 1.0 } else { v };
-        if image.color().bytes_per_pixel() / image.color().channel_count() > 1 {
+        if is_deep(&image) {
             let table: Vec<f32> = (0..=65535).map(|v| decode(f64::from(v) / 65535.0)).collect();
             let rgba = image.into_rgba16();
             return Texture::from_fn(width, height, |x, y| {

@@ -16,7 +16,7 @@ mod told;
 use std::borrow::Cow;
 use std::cell::RefCell;
 use std::collections::HashMap;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
 use base64::Engine as _;
 use glam::{DAffine3, DMat4};
@@ -27,6 +27,7 @@ use self::primitive::{Drawn, Posed};
 use self::texture::TextureKey;
 use self::told::{Matter, Told};
 use crate::error::{Error, Result, one_line};
+use crate::scene::folder::Folder;
 use crate::scene::{Object, Scene, file, file_name};
 
 /// The deepest nesting of nodes.
@@ -36,12 +37,12 @@ const MAX_OBJECTS: usize = 1 << 20;
 
 /// Loads the glTF or GLB file at `path`; textures that are missing become
 /// warnings, missing geometry is an error.
-pub(super) fn load(path: &Path) -> Result<Scene> {
+pub(super) fn load(path: &Path, folder: &Folder) -> Result<Scene> {
     let bytes = file::read(path)?;
     let (root, blob) = document::read(path, &bytes)?;
     let place = path.display().to_string();
     let mut loader = Loader {
-        folder: path.parent().unwrap_or(Path::new("")).to_path_buf(),
+        folder,
         root: &root,
         buffers: Vec::new(),
         files: RefCell::new(vec![path.to_path_buf()]),
@@ -67,7 +68,7 @@ pub(super) fn load(path: &Path) -> Result<Scene> {
 
 struct Loader<'a> {
     place: String,
-    folder: PathBuf,
+    folder: &'a Folder,
     root: &'a Root,
     /// `None` for a buffer that names no bytes: what is packed may have none of its own.
     buffers: Vec<Option<Cow<'a, [u8]>>>,
@@ -108,8 +109,8 @@ impl<'a> Loader<'a> {
         Error::invalid(format_args!("{}, {part}", self.place), what, hint)
     }
 
-    /// The bytes that a URI names: in the URI itself, or a file in or below the
-    /// scene's own folder.
+    /// The bytes that a URI names: in the URI itself, or in a file that the scene's folder
+    /// lets it name.
     fn resolve(&self, uri: &str, part: &str) -> Result<Vec<u8>> {
         if let Some(data) = uri.strip_prefix("data:") {
             let decoded = data
@@ -120,20 +121,11 @@ impl<'a> Loader<'a> {
             });
         }
         let decoded = percent_encoding::percent_decode_str(uri).decode_utf8_lossy();
-        let relative = Path::new(&*decoded);
-        let inside =
-            relative.components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
-        if !inside || decoded.contains(':') {
-            return Err(self.bad(
-                part,
-                format_args!("'{}' leads out of the scene's folder", one_line(uri)),
-                "put the file beside the scene and name it without '..'",
-            ));
-        }
-        let path = self.folder.join(relative);
-        let bytes = file::read(&path);
-        self.files.borrow_mut().push(path);
-        bytes.map_err(|e| self.bad(part, e, "put the file beside the scene"))
+        let read = self.folder.open(&decoded).and_then(|found| {
+            self.files.borrow_mut().push(found.path.clone());
+            found.read()
+        });
+        read.map_err(|e| self.bad(part, e, "put the file beside the scene"))
     }
 
     fn read_buffers(&self, blob: Option<Cow<'a, [u8]>>) -> Result<Vec<Option<Cow<'a, [u8]>>>> {

@@ -7,6 +7,7 @@ use super::extensions::TEXTURE_SOURCES;
 use super::json::{Sampler, TextureSource};
 use super::told::Matter;
 use crate::error::Result;
+use crate::scene::image_file;
 use crate::scene::texture::Encoding;
 use crate::scene::{Filter, Sampling, Texture, Wrap};
 
@@ -79,7 +80,8 @@ impl Loader<'_> {
         let place = format!("{}, {part}", self.place);
         let decoded = self
             .image(key.image, &part)
-            .and_then(|bytes| Texture::decode_as(&bytes, &place, key.encoding))
+            .and_then(|bytes| image_file::decode(&bytes, &place))
+            .map(|image| Texture::from_image(image, key.encoding))
             .and_then(|texture| self.scene.add_texture(texture.sampled(key.sampling)));
         let made = decoded.map_err(|e| self.told.error(&e));
         self.textures.insert(key, made);

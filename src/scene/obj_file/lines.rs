@@ -1,14 +1,15 @@
 //! The statements of OBJ and MTL files.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, BufReader, Cursor, Read};
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result, one_line};
-use crate::scene::file;
 
 /// The longest statement, in bytes.
 const MAX_BYTES: u64 = 1 << 24;
+/// The longest file in UTF-16, which is taken whole, in bytes.
+const MAX_UTF16: u64 = 1 << 30;
 /// How much of a statement an error shows, in characters.
 const SHOWN: usize = 60;
 
@@ -39,8 +40,8 @@ impl Statement {
     ///
     /// # Errors
     /// What is wrong with it.
-    pub fn number(word: &str) -> Result<f32, String> {
-        match word.parse::<f32>() {
+    pub fn number(word: &str) -> Result<f64, String> {
+        match word.parse::<f64>() {
             Ok(number) if number.is_finite() => Ok(number),
             Ok(_) => Err(format!("'{}' is no finite number", shown(word))),
             Err(_) => Err(format!("'{}' is no number", shown(word))),
@@ -58,21 +59,36 @@ pub(super) fn shown(text: &str) -> String {
     one_line(text.chars().take(SHOWN).collect::<String>())
 }
 
-/// Reads a file statement by statement.
+/// Reads a file statement by statement. Lines end as on Unix, Windows or old Macs; text is
+/// UTF-8, Latin-1, or UTF-16 in either order of bytes.
 pub(super) struct Lines {
     path: PathBuf,
-    reader: BufReader<File>,
+    reader: Box<dyn BufRead>,
     line: usize,
+    /// Whether the line before ended in a carriage return: a line feed is part of that end.
+    returned: bool,
 }
 
 impl Lines {
-    /// Opens the file at `path`.
+    /// Reads an open file, which lies at `path`.
     ///
     /// # Errors
-    /// As [`file::open`].
-    pub fn open(path: &Path) -> Result<Self> {
-        let (file, _) = file::open(path)?;
-        Ok(Lines { path: path.to_path_buf(), reader: BufReader::new(file), line: 0 })
+    /// [`Error::Io`], and [`Error::Unsupported`] for UTF-16 of more than 1 GiB.
+    pub fn of(file: File, path: &Path) -> Result<Self> {
+        let fail = |e| Error::io("read", path, e);
+        let mut reader = BufReader::new(file);
+        let start = reader.fill_buf().map_err(fail)?;
+        // ASCII in UTF-16 has a zero in every other byte.
+        let order: Option<fn([u8; 2]) -> u16> = match *start {
+            [0xff, 0xfe, ..] | [1..=255, 0, 1..=255, 0, ..] => Some(u16::from_le_bytes),
+            [0xfe, 0xff, ..] | [0, 1..=255, 0, 1..=255, ..] => Some(u16::from_be_bytes),
+            _ => None,
+        };
+        let reader: Box<dyn BufRead> = match order {
+            None => Box::new(reader),
+            Some(unit) => Box::new(Cursor::new(utf16(reader, unit, path)?)),
+        };
+        Ok(Lines { path: path.to_path_buf(), reader, line: 0, returned: false })
     }
 
     /// The next statement that is neither empty nor a comment; `None` at the end.
@@ -102,9 +118,28 @@ impl Lines {
 
     fn read_line(&mut self) -> Result<Option<String>> {
         let mut bytes = Vec::new();
-        let reader = self.reader.by_ref();
-        let read = reader.take(MAX_BYTES + 1).read_until(b'\n', &mut bytes);
-        if read.map_err(|e| Error::io("read", &self.path, e))? == 0 {
+        let mut begun = false;
+        loop {
+            let part = self.reader.fill_buf().map_err(|e| Error::io("read", &self.path, e))?;
+            if part.is_empty() {
+                break;
+            }
+            if std::mem::take(&mut self.returned) && part[0] == b'\n' {
+                self.reader.consume(1);
+                continue;
+            }
+            begun = true;
+            let end = part.iter().position(|b| matches!(b, b'\n' | b'\r'));
+            bytes.extend_from_slice(&part[..end.unwrap_or(part.len())]);
+            self.returned = end.is_some_and(|end| part[end] == b'\r');
+            let used = end.map_or(part.len(), |end| end + 1);
+            self.reader.consume(used);
+            if end.is_some() {
+                break;
+            }
+            self.check_length(bytes.len(), self.line + 1)?;
+        }
+        if !begun {
             return Ok(None);
         }
         self.line += 1;
@@ -126,6 +161,21 @@ impl Lines {
         let place = format!("{}, line {line}", self.path.display());
         Err(Error::invalid(place, "the statement is longer than 16 MiB", "divide it"))
     }
+}
+
+/// The text of a file in UTF-16, as UTF-8. What is no UTF-16 becomes a mark of its own.
+fn utf16(reader: impl Read, unit: fn([u8; 2]) -> u16, path: &Path) -> Result<String> {
+    let mut bytes = Vec::new();
+    let read = reader.take(MAX_UTF16 + 1).read_to_end(&mut bytes);
+    read.map_err(|e| Error::io("read", path, e))?;
+    if bytes.len() as u64 > MAX_UTF16 {
+        let what = "it is text in UTF-16 of more than 1 GiB";
+        return Err(Error::unsupported(path.display(), what, "save it as UTF-8"));
+    }
+    let units = bytes.chunks_exact(2).map(|pair| unit([pair[0], pair[1]]));
+    let text = char::decode_utf16(units).map(|c| c.unwrap_or(char::REPLACEMENT_CHARACTER));
+    // A byte order mark is none of the text.
+    Ok(text.skip_while(|c| *c == '\u{feff}').collect())
 }
 
 #[cfg(test)]

@@ -1,100 +1,73 @@
 //! Wavefront OBJ with MTL.
 
-mod clean;
+mod geometry;
 mod lines;
+mod map;
+mod mesh;
 mod mtl;
+mod unread;
 
-use std::io::BufReader;
+use std::collections::HashMap;
 use std::path::Path;
 
-use glam::{Vec2, Vec3};
+use glam::DAffine3;
 
-use self::clean::Cleaner;
-use crate::error::{Error, Result};
-use crate::scene::{Material, Mesh, Scene, Shape, file_name};
+use self::geometry::Reader;
+use self::lines::Lines;
+use self::mesh::Builder;
+use crate::error::Result;
+use crate::scene::folder::Folder;
+use crate::scene::{AlphaMode, Material, Scene, Shape, file, file_name};
 
 /// Loads the OBJ file at `path`; materials and textures that are missing become
 /// warnings.
-pub(super) fn load(path: &Path) -> Result<Scene> {
+pub(super) fn load(path: &Path, folder: &Folder) -> Result<Scene> {
     let files = vec![path.to_path_buf()];
     let mut scene = Scene { source: file_name(path), files, ..Scene::default() };
-    let options = tobj::LoadOptions { triangulate: true, single_index: true, ..Default::default() };
-    let mut cleaner = Cleaner::open(path, &mut scene)?;
-    // The cleaner hands no `mtllib` on.
-    let no_materials = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
-    let loaded = tobj::load_obj_buf(&mut BufReader::new(&mut cleaner), &options, no_materials);
-    let models = match loaded {
-        Ok((models, _)) => models,
-        Err(e) => {
-            let other = || Error::invalid(path.display(), e, "export the file again");
-            return Err(cleaner.failed.or(cleaner.beyond).unwrap_or_else(other));
-        }
-    };
-    cleaner.warn();
-    let segments = cleaner.segments;
+    let lines = Lines::of(file::open(path)?.0, path)?;
+    let mut reader = Reader::new(path, folder, &mut scene);
+    reader.read(lines)?;
+    let (geometry, library) = reader.finish();
 
     let fallback = scene.materials.len();
     scene.materials.push(Material::default());
-    for model in models.into_iter().filter(|model| !model.mesh.indices.is_empty()) {
-        let Some(segment) = model.name.parse().ok().and_then(|i: usize| segments.get(i)) else {
+    let place = path.display().to_string();
+    let mut builder = Builder::new(&place, &geometry);
+    let mut see_through = HashMap::new();
+    for (i, segment) in geometry.segments.iter().enumerate() {
+        let end = geometry.segments.get(i + 1).map_or(geometry.faces.len(), |next| next.first);
+        if end == segment.first {
             continue;
-        };
-        let material = segment.material.unwrap_or(fallback);
-        scene.add(segment.name.clone(), Shape::Mesh(mesh(&model.mesh, material)));
+        }
+        let mut mesh = builder.mesh(segment, end)?;
+        mesh.material = segment.material.unwrap_or(fallback);
+        if mesh.colours.iter().any(|c| c.w < 1.0) {
+            mesh.material = *see_through
+                .entry(mesh.material)
+                .or_insert_with(|| with_alpha(&mut scene, mesh.material));
+        }
+        scene.add(segment.name.clone(), Shape::Mesh(mesh));
+        if let Some(object) = scene.objects.last_mut() {
+            object.place = DAffine3::from_translation(builder.origin);
+        }
     }
+    if builder.flat > 0 {
+        let (source, flat) = (&scene.source, builder.flat);
+        let what = format!("{source}: {flat} faces of smoothing groups lack normals and are flat");
+        scene.warnings.push(what);
+    }
+    library.warn_of_clear(&mut scene);
     Ok(scene)
 }
 
-/// The mesh with what its corners do not say filled in.
-fn mesh(read: &tobj::Mesh, material: usize) -> Mesh {
-    let triples = |v: &[f32]| v.chunks_exact(3).map(Vec3::from_slice).collect::<Vec<_>>();
-    let mut mesh = Mesh {
-        more_uvs: Vec::new(),
-        positions: triples(&read.positions),
-        normals: triples(&read.normals),
-        uvs: read.texcoords.chunks_exact(2).map(Vec2::from_slice).collect(),
-        colours: triples(&read.vertex_color).into_iter().map(|c| c.extend(1.0)).collect(),
-        triangles: read.indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
-        material,
-    };
-    if mesh.uvs.iter().all(|uv| uv.is_nan()) {
-        mesh.uvs.clear();
+/// The material of that number, for vertices with alphas: itself, or one like it that shows
+/// them.
+fn with_alpha(scene: &mut Scene, material: usize) -> usize {
+    let own = &scene.materials[material];
+    if own.alpha_mode != AlphaMode::Opaque {
+        return material;
     }
-    for uv in &mut mesh.uvs {
-        let given = if uv.is_nan() { Vec2::ZERO } else { *uv };
-        // OBJ counts v upwards.
-        *uv = Vec2::new(given.x, 1.0 - given.y);
-    }
-    if mesh.normals.iter().all(|n| n.is_nan()) {
-        mesh.normals.clear();
-    } else {
-        fill_normals(&mut mesh);
-    }
-    mesh
-}
-
-/// Gives corners without normals that of their triangle, on vertices of their own.
-fn fill_normals(mesh: &mut Mesh) {
-    for t in 0..mesh.triangles.len() {
-        let corners = mesh.triangles[t].map(|i| i as usize);
-        let [a, b, c] = corners.map(|i| mesh.positions[i]);
-        let flat = (b - a).cross(c - a).try_normalize().unwrap_or(Vec3::Z);
-        for (k, i) in corners.into_iter().enumerate() {
-            if mesh.normals[i].is_nan() {
-                mesh.triangles[t][k] = mesh.positions.len() as u32;
-                mesh.positions.push(mesh.positions[i]);
-                mesh.normals.push(flat);
-                if let Some(uv) = mesh.uvs.get(i).copied() {
-                    mesh.uvs.push(uv);
-                }
-                if let Some(colour) = mesh.colours.get(i).copied() {
-                    mesh.colours.push(colour);
-                }
-            }
-        }
-    }
-    // What is left without a normal is a vertex of no triangle.
-    for normal in mesh.normals.iter_mut().filter(|n| n.is_nan()) {
-        *normal = Vec3::Z;
-    }
+    let blended = Material { alpha_mode: AlphaMode::Blend, ..own.clone() };
+    scene.materials.push(blended);
+    scene.materials.len() - 1
 }

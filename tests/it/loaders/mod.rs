@@ -2,8 +2,12 @@
 
 pub mod damage;
 mod gltf;
+mod inputs;
 mod obj;
+mod outside;
+mod pictures;
 mod splats;
+mod table;
 mod tfx;
 mod vdb;
 

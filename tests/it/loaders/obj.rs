@@ -104,12 +104,11 @@ fn files_of_ordinary_exporters_are_read() {
     let scene = obj(format!("{TRIANGLE}l 1 2 3\np 1\nf 1 2\nf 1 2 3\n")).unwrap();
     assert_eq!(scene.triangle_count(), 1);
     warned(&scene, 1, &["3 statements of points and lines"]);
-    // Colours of some vertices.
-    let scene = obj("v 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0 0 0 1\nf 1 2 3\n").unwrap();
+    // Colours of some vertices, whichever.
+    let scene = obj("v 0 0 0\nv 1 0 0 1 0 0\nv 0 1 0 0 0 1\nv 9 9 9\nf 1 2 3\n").unwrap();
     let colours: Vec<Vec3> = mesh(&scene, 0).colours.iter().map(|c| c.truncate()).collect();
-    assert_eq!(colours, [Vec3::X, Vec3::ONE, Vec3::Z]);
-    let scene = obj("v 0 0 0\nv 1 0 0 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
-    warned(&scene, 1, &["only some vertices have colours"]);
+    assert_eq!(colours, [Vec3::ONE, Vec3::X, Vec3::Z]);
+    warned(&scene, 1, &["2 of 4 vertices have no colour"]);
 }
 
 #[test]
@@ -141,9 +140,12 @@ fn attributes_that_are_no_numbers_count_as_none() {
 }
 
 #[test]
-fn attributes_that_come_after_their_corners_are_missed_aloud() {
-    let scene = obj(format!("{TRIANGLE}f 1/1 2/1 3/1\nvt 0.5 0.5\nf 1/1 2/1 3/1\n")).unwrap();
-    warned(&scene, 1, &["3 corners", "first texture coordinate"]);
+fn attributes_may_come_after_their_corners() {
+    let scene = obj(format!("{TRIANGLE}f 1/1 2/1 3/1\nvt 0.5 0.25\n")).unwrap();
+    assert_eq!(
+        (&mesh(&scene, 0).uvs[..], scene.warnings.len()),
+        (&[Vec2::new(0.5, 0.75); 3][..], 0)
+    );
     // Where there are none at all, nothing is missed.
     assert!(obj(format!("{TRIANGLE}f 1/1 2/1 3/1\n")).unwrap().warnings.is_empty());
 }
@@ -197,13 +199,19 @@ fn textures_have_a_limit() {
 #[cfg(unix)]
 #[test]
 fn only_regular_files_are_read() {
-    let text = format!("mtllib /dev/zero\n{TRIANGLE}f 1 2 3\n");
-    let mut scene = obj(&text).unwrap();
-    warned(&scene, 1, &["/dev/zero: it is no regular file"]);
+    use screendoor::scene::{LoadOptions, load_with};
+    let text = format!("mtllib /dev/zero\nmtllib a.mtl\n{TRIANGLE}f 1 2 3\n");
+    let mtl = b"newmtl m\nmap_Kd /dev/zero\n";
+    let here = folder(&[("a.obj", text.as_bytes()), ("a.mtl", mtl)]);
+    let mut scene = load_in(here.path(), "a.obj").unwrap();
+    warned(&scene, 2, &["its materials: '/dev/zero': it leads out of the scene's folder"]);
+    // Nor where it is allowed.
+    let source = here.path().join("a.obj").display().to_string();
+    let allowed =
+        load_with(&source, &LoadOptions { allow_outside: true, ..LoadOptions::default() }).unwrap();
+    warned(&allowed, 2, &["its materials: cannot read /dev/zero: it is no regular file"]);
     let error = scene.apply_texture(Path::new("/dev/zero")).unwrap_err().to_string();
     assert_eq!(error, "cannot read /dev/zero: it is no regular file: name one");
-    let scene = with_mtl("newmtl m\nmap_Kd /dev/zero\n");
-    warned(&scene, 1, &["/dev/zero: it is no regular file"]);
 
     let folder = folder(&[]);
     for name in ["a.obj", "a.gltf"] {

@@ -40,7 +40,7 @@ fn file(header: &str, splats: &[[u32; 4]]) -> Vec<u8> {
 /// No turn: the quaternion's real part is left out, the others are next to 0.
 const STRAIGHT: u32 = 512 << 20 | 512 << 10 | 512;
 /// In the middle of the chunk's upper end, e⁰ wide along x, red and half opaque.
-const SPLAT: [u32; 4] = [u32::MAX, STRAIGHT, 0x7ff << 21, 0xff00_0080];
+pub const SPLAT: [u32; 4] = [u32::MAX, STRAIGHT, 0x7ff << 21, 0xff00_0080];
 
 fn load(bytes: &[u8]) -> Result<Scene, Error> {
     load_in(folder(&[("a.ply", bytes)]).path(), "a.ply")
@@ -68,13 +68,18 @@ fn splats_become_ellipsoids() {
     assert_eq!((scene.files.len(), scene.warnings.len()), (1, 0));
 }
 
-#[test]
-fn spherical_harmonics_are_a_warning() {
+/// A file of one splat with spherical harmonics.
+pub fn with_harmonics() -> Vec<u8> {
     let header =
         header(1).replace("end_header", "element sh 1\nproperty uchar f_rest_0\nend_header");
     let mut bytes = file(&header, &[SPLAT]);
     bytes.push(7);
-    warned(&load(&bytes).unwrap(), 1, &["direction of view"]);
+    bytes
+}
+
+#[test]
+fn spherical_harmonics_are_a_warning() {
+    warned(&load(&with_harmonics()).unwrap(), 1, &["direction of view"]);
 }
 
 #[test]

@@ -340,7 +340,7 @@ fn of_several_grids_the_fog_is_drawn_or_the_one_that_is_named() {
     let path = folder.path().join("a.vdb").display().to_string();
     let load = |grid: &str| {
         let grid = (!grid.is_empty()).then(|| grid.to_string());
-        load_with(&path, &LoadOptions { grid })
+        load_with(&path, &LoadOptions { grid, ..LoadOptions::default() })
     };
     let scene = load("").unwrap();
     assert_eq!(voxels(&scene), [Vec3::new(12.0, 0.0, -8.0)]);
@@ -362,7 +362,9 @@ fn of_several_grids_the_fog_is_drawn_or_the_one_that_is_named() {
     says("surface", "level sets: 'surface'");
     says("vel", "no grid of Tree_float_5_4_3 (it has: 'vel' of Tree_vec3s_5_4_3)");
     says("smok", "unknown grid 'smok'; did you mean 'smoke'?");
-    let error = load_with("a.obj", &LoadOptions { grid: Some("a".into()) }).unwrap_err();
+    let error =
+        load_with("a.obj", &LoadOptions { grid: Some("a".into()), ..LoadOptions::default() })
+            .unwrap_err();
     assert!(error.to_string().contains("no grids to choose from"), "{error}");
 }
 
