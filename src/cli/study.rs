@@ -235,6 +235,9 @@ pub(super) fn reported(
         });
     }
     let results = write_report(store, about)?;
+    for scene in &results.scenes {
+        scene.warnings.iter().for_each(|w| console.warn(&format!("{}: {w}", scene.name)));
+    }
     // Of a part there is no answer yet.
     let whole = results.missing.iter().all(|m| m.why.is_some());
     let document = Document {

@@ -176,7 +176,9 @@ fn sweep(folder: &Path, grace: Duration) {
         if !is_partial(&path) {
             continue;
         }
-        let age = entry.metadata().and_then(|m| m.modified()).ok().and_then(|t| t.elapsed().ok());
+        // No pipe of that name, at which opening would wait.
+        let Some(metadata) = entry.metadata().ok().filter(|m| m.is_file()) else { continue };
+        let age = metadata.modified().ok().and_then(|t| t.elapsed().ok());
         let is_old = age.is_some_and(|age| age >= grace);
         // Who writes it holds its lock.
         if is_old && File::open(&path).is_ok_and(|file| file.try_lock().is_ok()) {

@@ -40,6 +40,9 @@ pub struct SceneFacts {
     pub source: String,
     /// The camera.
     pub camera: String,
+    /// What its file holds and is not drawn, a line for each kind.
+    #[serde(default)]
+    pub warnings: Vec<String>,
     /// The pixel that the report's inspector opens at.
     pub pixel: [u16; 2],
     /// It in numbers.

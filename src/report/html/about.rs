@@ -133,6 +133,9 @@ pub(super) fn scenes(content: &Content<'_>) -> Markup {
             depths lie fragments that share a depth with another one at a sample that both cover: where there \
             are any, promises for differing depths are not kept." },
             &again))
+        @for s in content.results.scenes.iter().filter(|s| !s.warnings.is_empty()) {
+            p class="absent" { b { "Not drawn of " (s.name) ": " } (s.warnings.join("; ")) "." }
+        }
         details {
             summary { "Cameras" }
             dl class="plain" {

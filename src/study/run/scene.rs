@@ -41,18 +41,26 @@ impl OpenScene {
     pub fn open(store: &Store, index: usize, base: &Path, watch: Watch<'_>) -> Result<Self> {
         let entry = &store.study().scenes[index];
         let own = store.folder().join(store.trace_name(index));
+        let mut warnings = None;
         let (path, shown) = match &entry.trace {
             Some(trace) => (base.join(trace), base.join(trace).display().to_string()),
             None => {
                 if !own.exists() {
                     watch(&format!("capturing {}", entry.name));
-                    draw(entry, base, &own)?;
+                    warnings = Some(draw(entry, base, &own)?);
                 }
                 (own, store.trace_name(index))
             }
         };
         let trace = Trace::open(&path)?;
-        let facts = facts(store, index, &trace, shown, watch)?;
+        let warnings = || match warnings {
+            Some(warnings) => Ok(warnings),
+            // Drawn by a process that ended before it could say so.
+            None => entry.source.as_deref().map_or(Ok(Vec::new()), |source| {
+                Ok(scene::load(&scene::seen_from(source, base))?.warnings)
+            }),
+        };
+        let facts = facts(store, index, &trace, shown, warnings, watch)?;
         let all = trace.header().pattern.samples();
         watch(&format!("{REFERENCE} at {all} on {}", entry.name));
         let fine = exact(store.study(), &trace, all)?;
@@ -66,8 +74,8 @@ fn exact(study: &Study, trace: &Trace, samples: u32) -> Result<Picture> {
     Ok(design.replay(trace, samples, 0, &study.replay_options())?.picture)
 }
 
-/// Draws a scene into the trace at `path`.
-fn draw(entry: &SceneEntry, base: &Path, path: &Path) -> Result<()> {
+/// Draws a scene into the trace at `path`. Returns what of it is not drawn.
+fn draw(entry: &SceneEntry, base: &Path, path: &Path) -> Result<Vec<String>> {
     let source = entry.source.as_deref().unwrap_or("");
     let mut scene = scene::load(&scene::seen_from(source, base))?;
     if let Some(texture) = &entry.texture {
@@ -83,7 +91,9 @@ fn draw(entry: &SceneEntry, base: &Path, path: &Path) -> Result<()> {
     let mut writer =
         TraceWriter::new(file, &place, capture.header().clone(), WriteOptions::default())?;
     capture.draw(&mut writer, |_, _| ())?;
-    writer.finish()?.0.commit()
+    writer.finish()?.0.commit()?;
+    drop(capture);
+    Ok(scene.warnings)
 }
 
 /// The facts of a scene, written where they are not there yet.
@@ -92,6 +102,7 @@ fn facts(
     index: usize,
     trace: &Trace,
     shown: String,
+    warnings: impl FnOnce() -> Result<Vec<String>>,
     watch: Watch<'_>,
 ) -> Result<SceneFacts> {
     let entry = &store.study().scenes[index];
@@ -119,6 +130,7 @@ fn facts(
         samples: header.pattern.samples(),
         source: header.source.clone(),
         camera: header.camera.clone(),
+        warnings: warnings()?,
         pixel: match entry.pixel {
             Some(pixel) => pixel,
             None => telling_pixel(trace)?,

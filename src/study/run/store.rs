@@ -367,8 +367,7 @@ fn look(folder: &Path, study: &Study) -> Result<Found> {
     let is_there = || path.try_exists().map_err(|e| Error::io("read", &path, e));
     if !is_there()? {
         let mut entries = fs::read_dir(folder).into_iter().flatten().flatten();
-        // Files under construction and the lock begin with a dot.
-        if !entries.any(|e| !e.file_name().as_encoded_bytes().starts_with(b".")) {
+        if entries.all(|entry| is_begun(&entry)) {
             return Ok(Found::Nothing);
         }
         // A program that begins a study makes its folders first, under the lock.
@@ -388,6 +387,16 @@ fn look(folder: &Path, study: &Study) -> Result<Found> {
         false if holds_results(folder) => Err(another(folder)),
         false => Ok(Found::Idle),
     }
+}
+
+/// Whether an entry of a folder is what a program that was ended while it began a study may
+/// have left there: its lock, files under construction, which begin with a dot as well, and
+/// folders in which nothing is yet.
+fn is_begun(entry: &fs::DirEntry) -> bool {
+    let name = entry.file_name();
+    let is_empty = || fs::read_dir(entry.path()).is_ok_and(|mut list| list.next().is_none());
+    name.as_encoded_bytes().starts_with(b".")
+        || FOLDERS.iter().any(|own| name == **own) && is_empty()
 }
 
 fn at_work(folder: &Path) -> Error {

@@ -409,3 +409,26 @@ fn a_wrong_study_file_is_one_line_of_error() {
     let (code, error) = place.bad(&["study", "none.toml", "-o", "out"]);
     assert!(code == 1 && error.contains("none.toml"), "{error}");
 }
+
+#[test]
+fn what_of_a_scene_is_not_drawn_is_told_by_a_study_too() {
+    let place = with_study(&[("source = 'builtin:glass'", "source = 'surf.obj'")]);
+    let scene = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nl 1 2\n";
+    fs::write(place.path("surf.obj"), scene).unwrap();
+    let run = || place.run(&["study", "s.toml", "-o", "out"]);
+    let said = String::from_utf8(run().stderr).unwrap();
+    assert!(said.contains("warning: glass: "), "{said}");
+    let facts = || {
+        let bytes = fs::read(place.path("out/scenes/glass.json")).unwrap();
+        serde_json::from_slice::<Value>(&bytes).unwrap()["warnings"].clone()
+    };
+    let told = facts();
+    assert!(told[0].as_str().unwrap().contains("points and lines are not drawn"), "{told}");
+    let page = fs::read_to_string(place.path("out/report.html")).unwrap();
+    assert!(page.contains("Not drawn of glass"));
+    // As where the process ended between the trace and its facts.
+    fs::remove_file(place.path("out/scenes/glass.json")).unwrap();
+    fs::remove_dir_all(place.path("out/runs")).unwrap();
+    run();
+    assert_eq!(facts(), told);
+}

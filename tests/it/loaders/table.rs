@@ -601,6 +601,8 @@ fn other_cases() -> Vec<Case> {
     };
     let narrow = [&[2.0, 3.0, 4.0], &[0.0; 12][..]].concat();
     let half = Written { packing: 6, half: true, ..super::vdb::full() };
+    let [level_set, unnamed] = super::vdb::level_sets();
+    let fog = Written { name: "smoke", ..Written::default() };
     vec![
         ply(
             "compressed Gaussian splats (PlayCanvas)",
@@ -660,6 +662,21 @@ fn other_cases() -> Vec<Case> {
                     ..Written::default()
                 }),
                 "'NonlinearFrustumMap'",
+            ),
+        ),
+        vdb(
+            "several grids",
+            Says(file("a.vdb", super::vdb::file(&[level_set, fog])), "only 'smoke' is drawn"),
+        ),
+        vdb("level sets, also by their values", Says(written(unnamed), "level sets: 'surface'")),
+        vdb(
+            "negative densities",
+            Says(
+                written(Written {
+                    voxels: vec![([0, 0, 0], 1.0), ([0, 0, 1], -0.5)],
+                    ..Written::default()
+                }),
+                "negative",
             ),
         ),
         vdb(

@@ -191,7 +191,7 @@ impl Written {
 }
 
 /// A file of these grids, of the version of the first.
-fn file(grids: &[Written]) -> Vec<u8> {
+pub fn file(grids: &[Written]) -> Vec<u8> {
     let mut file = b" BDV\0\0\0\0".to_vec();
     for word in [grids[0].version, 11, 0] {
         file.extend(word.to_le_bytes());
@@ -316,7 +316,7 @@ fn what_is_no_density_is_refused() {
 }
 
 /// A level set as it says itself, and one that does not.
-fn level_sets() -> [Written; 2] {
+pub fn level_sets() -> [Written; 2] {
     let voxels = vec![([0, 0, 0], -1.5), ([0, 0, 1], 0.5), ([0, 0, 2], 2.5)];
     let named = Written { name: "sdf", class: "level set", ..Written::default() };
     let unnamed = Written {
