@@ -245,7 +245,11 @@ fn reproduce_says_how_long_it_takes_and_keeps_out_of_other_folders() {
     let help = place.good(&["reproduce", "--help"]);
     // However it is wrapped.
     let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(help.contains("half an hour on two cores") && help.contains("[default: screendoor-results]"), "{help}");
+    assert!(
+        help.contains("half an hour on two cores")
+            && help.contains("[default: screendoor-results]"),
+        "{help}"
+    );
 }
 
 /// Starts the program, waits until `begun`, interrupts it and returns what it said.
