@@ -271,32 +271,3 @@ fn a_trace_that_is_written_over_while_it_is_read_is_an_error() {
     }
     assert!(refused > 0, "no run was met while it read");
 }
-
-/// Which files the program opens, of those that are no library's or system's.
-#[test]
-#[ignore = "needs strace"]
-fn a_scene_opens_no_file_outside_of_its_folder() {
-    let folder = tempfile::tempdir().unwrap();
-    let scene = folder.path().join("scene");
-    fs::create_dir(&scene).unwrap();
-    fs::write(folder.path().join("x.mtl"), "newmtl a\nKd 1 0 0\n").unwrap();
-    let text = "mtllib ../x.mtl\nusemtl a\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
-    fs::write(scene.join("a.obj"), text).unwrap();
-    let log = folder.path().join("log");
-    let strace = Command::new("strace")
-        .args(["-f", "-e", "trace=open,openat,openat2", "-o"])
-        .args([log.as_path(), Path::new(PROGRAM)])
-        .args(["capture", "scene/a.obj", "-o", "t.arrow", "--size", "16x16"])
-        .current_dir(folder.path())
-        .output();
-    let Ok(output) = strace else {
-        eprintln!("skipped: there is no strace");
-        return;
-    };
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(!said.contains("Kd 1"), "{said}");
-    let log = fs::read_to_string(log).unwrap();
-    assert!(log.contains("a.obj"), "{log}");
-    let outside: Vec<&str> = log.lines().filter(|line| line.contains("x.mtl")).collect();
-    assert!(outside.is_empty(), "{outside:?}");
-}
