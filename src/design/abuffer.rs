@@ -53,7 +53,7 @@ impl Blueprint for ABuffer {
                 Overflow::Furthest => OrderPromise::Independent,
                 Overflow::Newest | Overflow::Blend => OrderPromise::Dependent,
             },
-            exact_opaque: OpaquePromise::where_first(values, OpaquePromise::Never),
+            exact_opaque: over_opaque::exactness(values, OpaquePromise::Never),
             seeded: false,
             ..Promises::NONE
         }

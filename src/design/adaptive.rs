@@ -47,7 +47,7 @@ impl Blueprint for Adaptive {
         Promises {
             // Which nodes are removed depends on what has come so far.
             order: OrderPromise::Dependent,
-            exact_opaque: OpaquePromise::where_first(values, OpaquePromise::Never),
+            exact_opaque: over_opaque::exactness(values, OpaquePromise::Never),
             seeded: false,
             ..Promises::NONE
         }

@@ -38,7 +38,7 @@ impl Blueprint for Blend {
     fn promises(values: &Values) -> Promises {
         Promises {
             order: OrderPromise::Dependent,
-            exact_opaque: OpaquePromise::where_first(values, OpaquePromise::Never),
+            exact_opaque: over_opaque::exactness(values, OpaquePromise::Never),
             seeded: false,
             ..Promises::NONE
         }

@@ -36,7 +36,7 @@ impl Blueprint for Hybrid {
             // Which layers end in the core and which in the tail does not depend on the
             // order, but the tail's sums are rounded as they come.
             order: OrderPromise::UpToRounding,
-            exact_opaque: OpaquePromise::where_first(values, OpaquePromise::WholePixels),
+            exact_opaque: over_opaque::exactness(values, OpaquePromise::WholePixels),
             seeded: false,
             ..Promises::NONE
         }

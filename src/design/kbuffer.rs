@@ -9,6 +9,7 @@ use crate::rop::{
     OrderPromise, OverOpaque, PixelWords, Port, Probe, Promises, Site, Transparent, colour,
     over_opaque,
 };
+use crate::shader;
 use crate::trace::Fragment;
 
 /// The design's entry in the registry.
@@ -35,13 +36,13 @@ impl Blueprint for KBuffer {
 
     fn port<const N: usize>(values: &Values, frame: &Frame) -> Result<Option<Port>> {
         let plain = Self::at::<N>(values, frame)?;
-        Ok(Some(Port::of("kbuffer", &Self::INFO, values, frame, plain)))
+        Ok(Some(Port::of(shader!("kbuffer"), &Self::INFO, values, frame, plain)))
     }
 
     fn promises(values: &Values) -> Promises {
         Promises {
             order: OrderPromise::Independent,
-            exact_opaque: OpaquePromise::where_first(values, OpaquePromise::WholePixels),
+            exact_opaque: over_opaque::exactness(values, OpaquePromise::WholePixels),
             seeded: false,
             // What is dropped is missing; and layers that cross within a pixel are
             // ordered as at its centre.

@@ -19,6 +19,7 @@ use crate::rop::{
     Blueprint, Engine, Family, Frame, Info, OpaquePromise, OrderPromise, Port, Promise, Promises,
     Reference, Stochastic, colour, depth_bits,
 };
+use crate::shader;
 
 /// The design's entry in the registry.
 pub struct LaineKarras;
@@ -79,7 +80,7 @@ impl Blueprint for LaineKarras {
 
     fn port<const N: usize>(values: &Values, frame: &Frame) -> Result<Option<Port>> {
         let plain = Self::at::<N>(values, frame)?;
-        Ok(Some(stochastic::port(("lk", true), &Self::INFO, values, frame, plain)))
+        Ok(Some(stochastic::port((shader!("lk"), true), &Self::INFO, values, frame, plain)))
     }
 
     fn promises(values: &Values) -> Promises {

@@ -65,7 +65,7 @@ impl Blueprint for MomentBased {
             // How much a reconstruction differs with the moments' rounding grows as their
             // matrix nears a singular one; only the bias bounds it.
             order: OrderPromise::AmplifiedRounding,
-            exact_opaque: OpaquePromise::where_first(values, OpaquePromise::Never),
+            exact_opaque: over_opaque::exactness(values, OpaquePromise::Never),
             seeded: false,
             ..Promises::NONE
         }

@@ -9,6 +9,7 @@ use crate::rop::{
     OrderPromise, OverOpaque, PixelWords, Port, Probe, Promises, Site, Transparent, colour,
     over_opaque,
 };
+use crate::shader;
 use crate::trace::Fragment;
 
 /// The design's entry in the registry.
@@ -35,14 +36,14 @@ impl Blueprint for Mlab {
 
     fn port<const N: usize>(values: &Values, frame: &Frame) -> Result<Option<Port>> {
         let plain = Self::at::<N>(values, frame)?;
-        Ok(Some(Port::of("mlab", &Self::INFO, values, frame, plain)))
+        Ok(Some(Port::of(shader!("mlab"), &Self::INFO, values, frame, plain)))
     }
 
     fn promises(values: &Values) -> Promises {
         Promises {
             // What comes between two that are already merged cannot part them.
             order: OrderPromise::Dependent,
-            exact_opaque: OpaquePromise::where_first(values, OpaquePromise::WholePixels),
+            exact_opaque: over_opaque::exactness(values, OpaquePromise::WholePixels),
             seeded: false,
             ..Promises::NONE
         }

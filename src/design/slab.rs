@@ -46,6 +46,7 @@ use crate::rop::{
     Threshold, Transparent, colour, over_opaque, random_subset, visible_independent,
     visible_stratified,
 };
+use crate::shader;
 use crate::trace::{Fragment, SampleMask, Unorm32};
 
 crate::options! {
@@ -130,7 +131,7 @@ impl Blueprint for Slab {
 
     fn port<const N: usize>(values: &Values, frame: &Frame) -> Result<Option<Port>> {
         let plain = Self::at::<N>(values, frame)?;
-        Ok(Some(Port::of("slab", &Self::INFO, values, frame, plain)))
+        Ok(Some(Port::of(shader!("slab"), &Self::INFO, values, frame, plain)))
     }
 
     fn promises(values: &Values) -> Promises {
@@ -150,7 +151,7 @@ impl Blueprint for Slab {
                 (true, false) => OrderPromise::UpToRounding,
                 (false, _) => OrderPromise::Dependent,
             },
-            exact_opaque: OpaquePromise::where_first(values, OpaquePromise::Never),
+            exact_opaque: over_opaque::exactness(values, OpaquePromise::Never),
             seeded: bits != 0,
             // Samples of a pixel share their bits.
             ..Promises::NONE

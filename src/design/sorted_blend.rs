@@ -49,7 +49,7 @@ impl Blueprint for SortedBlend {
             // Primitives of equal mean depth, and a primitive's own fragments in a
             // pixel, are blended as they come.
             order: OrderPromise::Dependent,
-            exact_opaque: OpaquePromise::where_first(values, OpaquePromise::Never),
+            exact_opaque: over_opaque::exactness(values, OpaquePromise::Never),
             seeded: false,
             ..Promises::NONE
         }

@@ -24,6 +24,7 @@ use crate::rop::{
     OrderPromise, PixelWords, Port, Probe, Promise, Promises, Reference, ReferenceKey, Round, Site,
     Stochastic, colour, depth_bits,
 };
+use crate::shader;
 
 crate::options! {
     /// What the place of a sample in its surface is counted in.
@@ -101,7 +102,7 @@ impl Blueprint for Systematic {
 
     fn port<const N: usize>(values: &Values, frame: &Frame) -> Result<Option<Port>> {
         let plain = Self::at::<N>(values, frame)?;
-        Ok(Some(stochastic::port(("systematic", true), &Self::INFO, values, frame, plain)))
+        Ok(Some(stochastic::port((shader!("systematic"), true), &Self::INFO, values, frame, plain)))
     }
 
     fn promises(values: &Values) -> Promises {

@@ -9,6 +9,7 @@ use crate::rop::{
     Layout, OnDevice, OpaquePromise, OrderPromise, OverOpaque, PixelWords, Port, Probe, Promises,
     Site, Transparent, ViewDepth, accumulators, colour, over_opaque, view_depth,
 };
+use crate::shader;
 use crate::trace::{Fragment, Unorm32};
 
 crate::options! {
@@ -79,13 +80,13 @@ impl Blueprint for WeightedBlended {
 
     fn port<const N: usize>(values: &Values, frame: &Frame) -> Result<Option<Port>> {
         let plain = Self::at::<N>(values, frame)?;
-        Ok(Some(Port::of("wboit", &Self::INFO, values, frame, plain)))
+        Ok(Some(Port::of(shader!("wboit"), &Self::INFO, values, frame, plain)))
     }
 
     fn promises(values: &Values) -> Promises {
         Promises {
             order: OrderPromise::UpToRounding,
-            exact_opaque: OpaquePromise::where_first(values, OpaquePromise::Never),
+            exact_opaque: over_opaque::exactness(values, OpaquePromise::Never),
             seeded: false,
             ..Promises::NONE
         }

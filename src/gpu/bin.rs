@@ -107,10 +107,10 @@ impl Binner {
         let scan_layout = gpu.layout(&[(0, Uniform), (1, Write), (2, Write)]);
         let touch_layout = gpu.layout(&[(0, Uniform), (1, Read), (3, Write)]);
         let (bin, scan) = (
-            shader::program(&["bin"], samples, constants),
-            shader::program(&["scan"], samples, &[]),
+            shader::program(&[shader::named("bin")], samples, constants),
+            shader::program(&[shader::named("scan")], samples, &[]),
         );
-        let touch = shader::program(&["touch"], samples, constants);
+        let touch = shader::program(&[shader::named("touch")], samples, constants);
         Ok(Binner {
             touch: gpu.pipeline(&touch, "touch", &touch_layout)?,
             first: [
@@ -125,7 +125,7 @@ impl Binner {
             scan: gpu.pipeline(&scan, "scan", &scan_layout)?,
             add: gpu.pipeline(&scan, "add", &scan_layout)?,
             longest: gpu.pipeline(
-                &shader::program(&["longest"], samples, &[]),
+                &shader::program(&[shader::named("longest")], samples, &[]),
                 "find",
                 &scan_layout,
             )?,

@@ -22,4 +22,4 @@ mod time;
 pub const TOLERANCE: f64 = 1e-5;
 
 pub use device::{Adapter, Gpu};
-pub use replay::{GpuOptions, GpuRun, GpuSeconds, Threads};
+pub use replay::{GpuOptions, GpuRun, GpuSeconds, Threads, replay};

@@ -104,7 +104,7 @@ mod tests {
 
     /// The members of a shader's structure, but for gaps.
     fn members(name: &str) -> (Vec<(String, usize, usize)>, usize) {
-        let text = shader::program(&["bindings"], 8, &[]);
+        let text = shader::program(&[shader::named("bindings")], 8, &[]);
         let module = wgsl::parse_str(&text).unwrap();
         let mut layouter = wgpu::naga::proc::Layouter::default();
         layouter.update(module.to_ctx()).unwrap();

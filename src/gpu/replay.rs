@@ -7,6 +7,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::design::Configured;
 use crate::error::Result;
 use crate::gpu::bin::{Binner, Scratch, Sorted, uniform};
 use crate::gpu::chunk::{Chunks, Uploaded};
@@ -15,7 +16,7 @@ use crate::gpu::params::Params;
 use crate::gpu::shader;
 use crate::gpu::time::Timer;
 use crate::picture::{Picture, TilePixels};
-use crate::rop::{Constant, Frame, Port, TileState, TileWords};
+use crate::rop::{Constant, Frame, Port, Replayed, Shader, TileState, TileWords};
 use crate::tile::{TILE_PIXELS, TileId, TileMap};
 use crate::trace::Trace;
 
@@ -126,6 +127,34 @@ const MAX_ROWS: u64 = 1 << 30;
 /// Threads of a group of `shaders/replay.wgsl`.
 const GROUP: usize = 64;
 
+/// Replays `trace` through a design on a GPU: the result, where the time went, and how many fragments
+/// were drawn over all passes.
+///
+/// # Errors
+/// As [`Configured::port`], [`Frame::of`] and [`GpuRun::new`].
+pub fn replay(
+    gpu: &Gpu,
+    design: &Configured,
+    trace: &Trace,
+    samples: u32,
+    seed: u32,
+    options: &GpuOptions<'_>,
+) -> Result<(Replayed, GpuSeconds, u64)> {
+    let frame = design.frame(trace, samples, seed)?;
+    let port = design.port(&frame)?;
+    let mut run = GpuRun::new(gpu, &port, &frame, trace, options)?;
+    let picture = run.picture()?;
+    let replayed = Replayed {
+        picture,
+        events: None,
+        state_bits: port.plain.state_bits(),
+        layout: port.plain.layout(),
+        passes: port.plain.passes(),
+        touched_tiles: run.touched_tiles(),
+    };
+    Ok((replayed, run.seconds().clone(), run.fragments()))
+}
+
 impl Programs {
     fn new(
         gpu: &Gpu,
@@ -145,7 +174,8 @@ impl Programs {
         let by_sample = threads == Threads::Sample && port.by_sample;
         let (draw, iterations) = if by_sample {
             let file = lanes_file(gpu, samples);
-            let source = self::source(&[port.program, file], port, samples, chunks.types());
+            let source =
+                self::source(&[port.program, shader::named(file)], port, samples, chunks.types());
             let pipeline = gpu.pipeline(&source, "draw_lanes", &layout)?;
             // Two loops over the samples, and what a reference value may take.
             let iterations = 2 * samples + u32::BITS;
@@ -180,7 +210,7 @@ fn lanes_file(gpu: &Gpu, samples: u32) -> &'static str {
 
 /// The text of a design's program for a trace's columns.
 pub(super) fn source(
-    files: &[&str],
+    files: &[Shader],
     port: &Port,
     samples: u32,
     types: impl Iterator<Item = (String, Constant)>,

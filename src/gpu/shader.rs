@@ -3,60 +3,43 @@
 
 use std::fmt::Write;
 
-use crate::rop::Constant;
+use crate::rop::{Constant, SHADERS, Shader};
+use crate::shader;
 
-/// Declares the files by their names.
-macro_rules! files {
-    ($($name:literal),+ $(,)?) => {
-        /// Names and texts.
-        pub(super) const FILES: &[(&str, &str)] =
-            &[$(($name, include_str!(concat!("shaders/", $name, ".wgsl")))),+];
-    };
-}
-
-files![
-    "append",
-    "arithmetic",
-    "bin",
-    "bindings",
-    "capture",
-    "colour",
-    "dither",
-    "enderton",
-    "fragment",
-    "kbuffer",
-    "lanes",
-    "lanes_subgroup",
-    "lanes_workgroup",
-    "layered",
-    "layers",
-    "lk",
-    "longest",
-    "mask_narrow",
-    "mask_wide",
-    "mlab",
-    "opacity",
-    "over_opaque",
-    "pixel_order",
-    "random",
-    "reference_value",
-    "replay",
-    "resolve",
-    "round",
-    "samples",
-    "scan",
-    "slab",
-    "state",
-    "stochastic",
-    "subset",
-    "surface",
-    "systematic",
-    "touch",
-    "tracked",
-    "view_depth",
-    "wboit",
-    "wide",
+/// The device's own.
+pub(super) const OWN: &[Shader] = &[
+    shader!("shaders/", "append"),
+    shader!("shaders/", "arithmetic"),
+    shader!("shaders/", "bin"),
+    shader!("shaders/", "bindings"),
+    shader!("shaders/", "capture"),
+    shader!("shaders/", "fragment"),
+    shader!("shaders/", "lanes"),
+    shader!("shaders/", "lanes_subgroup"),
+    shader!("shaders/", "lanes_workgroup"),
+    shader!("shaders/", "longest"),
+    shader!("shaders/", "mask_narrow"),
+    shader!("shaders/", "mask_wide"),
+    shader!("shaders/", "random"),
+    shader!("shaders/", "replay"),
+    shader!("shaders/", "resolve"),
+    shader!("shaders/", "scan"),
+    shader!("shaders/", "state"),
+    shader!("shaders/", "touch"),
+    shader!("shaders/", "wide"),
 ];
+
+/// The shader of a name, of the device's own or of the kits'.
+///
+/// # Panics
+/// Where there is none: a fault of the crate's own, or of a design's shader.
+pub fn named(name: &str) -> Shader {
+    let all = OWN.iter().chain(SHADERS);
+    *all.clone().find(|s| s.name == name).unwrap_or_else(|| {
+        let names = all.map(|s| s.name).collect::<Vec<_>>().join(" ");
+        panic!("there is no shader '{name}', only {names}")
+    })
+}
 
 /// The text of the program that `files` are, with those that they use, each once and before
 /// its users, behind `constants`. `mask` stands for the file that holds sets of up to
@@ -64,13 +47,13 @@ files![
 ///
 /// # Panics
 /// Where a file is missing: a fault of the crate's own.
-pub fn program(files: &[&str], samples: u32, constants: &[(String, Constant)]) -> String {
+pub fn program(files: &[Shader], samples: u32, constants: &[(String, Constant)]) -> String {
     let mut text = String::new();
     for (name, value) in constants {
         writeln!(text, "const {name}: {value};").expect("strings can be written to");
     }
     let mut done = Vec::new();
-    files.iter().for_each(|file| append(file, samples, &mut done, &mut text));
+    files.iter().for_each(|file| append(*file, samples, &mut done, &mut text));
     #[cfg(test)]
     let text = defect::plant(text);
     text
@@ -104,28 +87,20 @@ pub(super) mod defect {
     }
 }
 
-fn append(name: &str, samples: u32, done: &mut Vec<String>, text: &mut String) {
-    let name = match name {
-        "mask" if samples <= 32 => "mask_narrow",
-        "mask" => "mask_wide",
-        name => name,
-    };
-    if done.iter().any(|d| d == name) {
+fn append(shader: Shader, samples: u32, done: &mut Vec<&'static str>, text: &mut String) {
+    if done.contains(&shader.name) {
         return;
     }
-    done.push(name.to_string());
-    let file = FILES.iter().find(|(file, _)| *file == name);
-    let (_, source) = file.unwrap_or_else(|| panic!("there is no shader '{name}'"));
-    for used in uses(source) {
-        append(used, samples, done, text);
+    done.push(shader.name);
+    for used in shader.uses() {
+        let name = match used {
+            "mask" if samples <= 32 => "mask_narrow",
+            "mask" => "mask_wide",
+            name => name,
+        };
+        append(named(name), samples, done, text);
     }
-    text.push_str(source);
-}
-
-/// The files that a file names.
-fn uses(source: &str) -> impl Iterator<Item = &str> {
-    let lines = source.lines().filter_map(|line| line.strip_prefix("// uses: "));
-    lines.flat_map(str::split_whitespace)
+    text.push_str(shader.text);
 }
 
 #[cfg(test)]
@@ -135,13 +110,13 @@ mod tests {
     #[test]
     fn a_file_is_put_in_once_and_before_its_users() {
         let constants = [("SAMPLES".to_string(), Constant::Whole(8))];
-        let text = program(&["touch"], 8, &constants);
+        let text = program(&[named("touch")], 8, &constants);
         assert!(text.starts_with("const SAMPLES: u32 = 8u;\n"));
         assert_eq!(text.matches("struct Fragment {").count(), 1);
         assert!(text.contains("alias Mask = u32;") && !text.contains("alias Mask = Wide;"));
         let place = |part: &str| text.find(part).expect(part);
         assert!(place("struct Params {") < place("fn touch("));
-        assert!(program(&["touch"], 64, &constants).contains("alias Mask = Wide;"));
+        assert!(program(&[named("touch")], 64, &constants).contains("alias Mask = Wide;"));
     }
 
     #[test]
@@ -152,6 +127,6 @@ mod tests {
             .map(|f| f.unwrap().path().file_stem().unwrap().to_string_lossy().into_owned())
             .collect();
         found.sort();
-        assert_eq!(found, FILES.iter().map(|f| f.0.to_string()).collect::<Vec<_>>());
+        assert_eq!(found, OWN.iter().map(|s| s.name.to_string()).collect::<Vec<_>>());
     }
 }

@@ -7,12 +7,12 @@ use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
 use super::device::Gpu;
 use super::replay::source;
 use super::shader::defect::{self, Defect};
-use super::shader::{self, FILES};
+use super::shader::{self, OWN};
 use super::{GpuOptions, GpuRun, Threads};
 use crate::design::{Configured, DESIGNS, configure};
 use crate::param::Kind;
 use crate::random::Stream;
-use crate::rop::{Constant, Contents, Which};
+use crate::rop::{Constant, Contents, SHADERS, Which};
 use crate::trace::{
     ColourFormat, ColumnId, DepthPlane, Fragment, Header, SampleMask, SamplePattern, Trace,
     TraceWriter, Unorm32, WriteOptions,
@@ -106,7 +106,8 @@ fn every_program_is_valid_at_every_sample_count() {
                 validate(&source(&[port.program], &port, samples, types()), &label);
                 if port.by_sample {
                     for lanes in ["lanes_subgroup", "lanes_workgroup"] {
-                        let text = source(&[port.program, lanes], &port, samples, types());
+                        let text =
+                            source(&[port.program, shader::named(lanes)], &port, samples, types());
                         validate(&text, &format!("{label} {lanes}"));
                     }
                 }
@@ -115,7 +116,7 @@ fn every_program_is_valid_at_every_sample_count() {
     }
     for file in ["bin", "scan", "touch", "longest"] {
         for samples in [8, 64] {
-            validate(&shader::program(&[file], samples, &columns[0]), file);
+            validate(&shader::program(&[shader::named(file)], samples, &columns[0]), file);
         }
     }
 }
@@ -223,7 +224,10 @@ fn a_planted_defect_is_found_whatever_part_it_is_in() {
             sound.push((*name, *threads, held));
         }
         let (.., sound) = sound.iter().find(same).unwrap();
-        assert!(FILES.iter().any(|(_, text)| text.contains(planted.0)), "no '{}'", planted.0);
+        let frame = design.frame(&trace, 8, 0).unwrap();
+        let program = design.port(&frame).unwrap().program;
+        let mut all = OWN.iter().chain(SHADERS).chain([&program]);
+        assert!(all.any(|s| s.text.contains(planted.0)), "no '{}'", planted.0);
         let found = defect::with(Some(*planted), || held(&gpu, &design, &trace, *threads));
         if found == *sound {
             hidden.push(format!("{name}: '{}'", planted.1));
@@ -248,7 +252,7 @@ fn what_fails_on_a_device_is_told() {
     let gpu = Gpu::open(None).unwrap();
     gpu.device.destroy();
     let (trace, design) = (trace(4), configure("lk", &[]).unwrap());
-    let lost = design.replay_on(&gpu, &trace, 4, 0, &GpuOptions::default());
+    let lost = super::replay::replay(&gpu, &design, &trace, 4, 0, &GpuOptions::default());
     let error = lost.map(|_| ()).unwrap_err().to_string();
     assert!(error.contains(&gpu.adapter().name) && error.contains("lost"), "{error}");
 }

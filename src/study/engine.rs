@@ -5,7 +5,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::design::Configured;
 use crate::error::{Error, Result};
-use crate::gpu::{Adapter, Gpu, GpuOptions, GpuSeconds, Threads};
+use crate::gpu::{self, Adapter, Gpu, GpuOptions, GpuSeconds, Threads};
 use crate::param::{Choice, Options};
 use crate::rop::{ReplayOptions, Replayed, Which};
 use crate::trace::Trace;
@@ -117,7 +117,7 @@ impl Engine {
     /// Replays a trace; `options` name another engine, which is not asked.
     ///
     /// # Errors
-    /// As [`Configured::replay`] and [`Configured::replay_on`].
+    /// As [`Configured::replay`] and [`gpu::replay`].
     pub fn replay(
         &self,
         design: &Configured,
@@ -138,7 +138,7 @@ impl Engine {
                     ..GpuOptions::default()
                 };
                 let (replayed, seconds, fragments) =
-                    design.replay_on(gpu, trace, samples, seed, &options)?;
+                    gpu::replay(gpu, design, trace, samples, seed, &options)?;
                 let adapter = gpu.adapter().clone();
                 Ok((replayed, Some(OnGpu { adapter, seconds, fragments })))
             }

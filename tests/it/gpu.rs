@@ -143,7 +143,7 @@ fn pictures(
     samples: u32,
     options: &GpuOptions,
 ) -> [Picture; 2] {
-    let (found, _, fragments) = design.replay_on(gpu, trace, samples, 7, options).unwrap();
+    let (found, _, fragments) = gpu::replay(gpu, design, trace, samples, 7, options).unwrap();
     let options = ReplayOptions { count_events: true, ..ReplayOptions::default() };
     let expected = design.replay(trace, samples, 7, &options).unwrap();
     assert_eq!(found.touched_tiles, expected.touched_tiles);

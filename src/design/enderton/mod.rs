@@ -16,6 +16,7 @@ use crate::rop::{
     OrderPromise, PixelOrder, PixelWords, Port, Probe, Promise, Promises, Reference, ReferenceKey,
     Round, Sampler, Site, Stochastic, Threshold, colour, depth_bits, random_subset, stratified,
 };
+use crate::shader;
 use crate::tile::TileGrid;
 use crate::trace::{Fragment, MAX_SAMPLES, SampleMask, Unorm32};
 
@@ -107,7 +108,7 @@ impl Blueprint for Enderton {
 
     fn port<const N: usize>(values: &Values, frame: &Frame) -> Result<Option<Port>> {
         let plain = Self::at::<N>(values, frame)?;
-        Ok(Some(stochastic::port(("enderton", false), &Self::INFO, values, frame, plain)))
+        Ok(Some(stochastic::port((shader!("enderton"), false), &Self::INFO, values, frame, plain)))
     }
 
     fn promises(values: &Values) -> Promises {

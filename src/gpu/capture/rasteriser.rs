@@ -169,7 +169,7 @@ fn pipeline(
     format: wgpu::TextureFormat,
 ) -> wgpu::RenderPipeline {
     let device = &gpu.device;
-    let source = shader::program(&["capture"], SAMPLES, &[]);
+    let source = shader::program(&[shader::named("capture")], SAMPLES, &[]);
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some("capture"),
         source: wgpu::ShaderSource::Wgsl(source.into()),

@@ -3,9 +3,11 @@
 use std::collections::VecDeque;
 
 use crate::error::{Error, Result};
-use crate::rop::design::{Contents, Design, Frame, Site};
-use crate::rop::event::{NoProbe, Record};
-use crate::rop::replay::engine::{Engine, Told};
+use crate::rop::contract::contents::Contents;
+use crate::rop::contract::design::Design;
+use crate::rop::contract::engine::{Engine, Told};
+use crate::rop::contract::event::{NoProbe, Record};
+use crate::rop::contract::frame::{Frame, Site};
 use crate::tile::TileGrid;
 use crate::trace::{Block, Fragment, SampleMask, Trace};
 

@@ -4,8 +4,8 @@
 use std::ops::Range;
 
 use crate::error::{Error, Result};
-use crate::rop::design::Frame;
-use crate::rop::replay::ReplayOptions;
+use crate::rop::contract::frame::Frame;
+use crate::rop::replay::options::ReplayOptions;
 use crate::tile::{TILE_PIXELS, TileGrid, TileId};
 use crate::trace::{SampleMask, Trace};
 

@@ -6,7 +6,7 @@ use std::ops::Range;
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, dispatch, u16x32};
 
-use crate::rop::design::Frame;
+use crate::rop::contract::frame::Frame;
 use crate::rop::replay::group::Group;
 use crate::tile::{TILE_SIDE, TileGrid, TileId};
 use crate::trace::{Batch, Column, STRETCH, Stretch};
@@ -196,7 +196,7 @@ fn find_changes<S: Simd>(simd: S, columns: [&[u16]; 2], len: usize, mut at: impl
 mod tests {
     use super::*;
     use crate::random::Stream;
-    use crate::rop::fast::levels;
+    use crate::rop::lanes::levels;
 
     /// Runs that end where a vector does, and elsewhere; one row or column for all.
     #[test]

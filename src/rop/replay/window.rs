@@ -10,9 +10,9 @@ use fearless_simd::Level;
 use rayon::prelude::*;
 
 use crate::error::Result;
-use crate::rop::design::Frame;
-use crate::rop::event::EventCounts;
-use crate::rop::replay::engine::{Engine, TileState, Told};
+use crate::rop::contract::engine::{Engine, TileState, Told};
+use crate::rop::contract::event::EventCounts;
+use crate::rop::contract::frame::Frame;
 use crate::rop::replay::group::Group;
 use crate::rop::replay::unit::{Part, Sorter, Unit};
 use crate::tile::{TileId, TileMap};

@@ -17,7 +17,7 @@ use tempfile::TempDir;
 
 use crate::design::configure;
 use crate::error::{Error, Result, panic_text};
-use crate::gpu::{Gpu, GpuOptions};
+use crate::gpu::{self, Gpu, GpuOptions};
 use crate::output::{OutputFile, is_partial};
 use crate::rop::ReplayOptions;
 use crate::study::stress::child::{Ended, command, disturbed, limited, run, terminate};
@@ -402,7 +402,7 @@ fn vanishing(path: &Path, open: &dyn Fn() -> Result<Option<Gpu>>) -> Result<Opti
         }
         let watch = |_, _| gpu.lose();
         let options = GpuOptions { rows: 1000, progress: &watch, ..GpuOptions::default() };
-        let attempt = || design.replay_on(&gpu, &trace, 8, 0, &options).map(|_| ());
+        let attempt = || gpu::replay(&gpu, &design, &trace, 8, 0, &options).map(|_| ());
         let found = ended(catch_unwind(AssertUnwindSafe(attempt)));
         let lost = found.code == Some(1) && found.said.contains("lost");
         fault.add(&found, if lost { Ok(()) } else { Err("the loss is not told".to_string()) });

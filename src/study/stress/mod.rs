@@ -26,7 +26,7 @@ pub use unfit::Unfit;
 
 use crate::design::{Configured, DESIGNS, configure};
 use crate::error::Result;
-use crate::gpu::{Gpu, GpuOptions, TOLERANCE};
+use crate::gpu::{self, Gpu, GpuOptions, TOLERANCE};
 use crate::param::Options;
 use crate::picture::Picture;
 use crate::rop::stochastic::{METHOD, Method};
@@ -354,7 +354,7 @@ impl Trial<'_> {
 
     fn on_gpu(&self, gpu: &Gpu, design: &Configured, plain: &Result<Picture>) -> Agreement {
         let options = GpuOptions::default();
-        let replayed = design.replay_on(gpu, &self.trace, self.case.samples, 0, &options);
+        let replayed = gpu::replay(gpu, design, &self.trace, self.case.samples, 0, &options);
         agreement(EngineName::Gpu.name(), plain, replayed.map(|(r, ..)| r.picture))
     }
 }
