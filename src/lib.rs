@@ -37,23 +37,16 @@
 
 #![warn(missing_docs)]
 
-pub mod capture;
 pub mod cli;
-pub mod design;
-pub mod error;
-pub mod gpu;
-pub mod metrics;
-pub mod output;
-pub mod param;
-pub mod picture;
-pub mod random;
-pub mod report;
-pub mod resolve;
-pub mod rop;
-pub mod scene;
-pub mod study;
-pub mod tile;
-pub mod trace;
+
+pub use screendoor_designs as design;
+pub use screendoor_gpu as gpu;
+pub use screendoor_report as report;
+pub use screendoor_rop as rop;
+pub use screendoor_rop::resolve;
+pub use screendoor_scene::{capture, scene};
+pub use screendoor_study::{metrics, study};
+pub use screendoor_trace::{error, options, output, param, picture, random, tile, trace};
 
 /// The worked example of `docs/ADD_A_DESIGN.md`, compiled and run as a test.
 #[cfg(doctest)]

@@ -1,0 +1,156 @@
+//! Multi-layer alpha blending (Salvi, Vaidyanathan, I3D 2014): layers in the order
+//! of their depths; where there is one too many, the last two are merged.
+
+use screendoor_trace::error::Result;
+use screendoor_trace::param::Values;
+use screendoor_rop::layers::{COVERAGE, LAYERS, Layer, Layering, contents};
+use screendoor_rop::{
+    Blueprint, Contents, Declaration, Family, Frame, Info, Layout, OnDevice, OpaquePromise,
+    OrderPromise, OverOpaque, PixelWords, Port, Probe, Promises, Site, Transparent, colour,
+    over_opaque,
+};
+use screendoor_rop::shader;
+use screendoor_trace::trace::Fragment;
+
+/// The design's entry in the registry.
+pub struct Mlab;
+
+impl Blueprint for Mlab {
+    const INFO: Info = Info {
+        name: "mlab",
+        family: Family::Layered,
+        summary: "layers sorted as they come; of one too many the last two are merged",
+        citation: "Salvi, Vaidyanathan: Multi-Layer Alpha Blending, I3D 2014",
+        params: &[over_opaque::PARAM, LAYERS, COVERAGE, colour::PARAM],
+        combinations: &[],
+    };
+
+    type At<const N: usize> = OverOpaque<MlabAt<N>, N>;
+
+    fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
+        let inner = MlabAt(Layering::of(values, frame));
+        Ok(OverOpaque::new(values, frame, over_opaque::of(values), inner))
+    }
+
+    const PORTED: bool = true;
+
+    fn port<const N: usize>(values: &Values, frame: &Frame) -> Result<Option<Port>> {
+        let plain = Self::at::<N>(values, frame)?;
+        Ok(Some(Port::of(shader!("mlab"), &Self::INFO, values, frame, plain)))
+    }
+
+    fn promises(values: &Values) -> Promises {
+        Promises {
+            // What comes between two that are already merged cannot part them.
+            order: OrderPromise::Dependent,
+            exact_opaque: over_opaque::exactness(values, OpaquePromise::WholePixels),
+            seeded: false,
+            ..Promises::NONE
+        }
+    }
+}
+
+/// The design for pixels of `N` samples.
+#[derive(Clone, Debug)]
+pub struct MlabAt<const N: usize>(Layering<N>);
+
+impl<const N: usize> Transparent<N> for MlabAt<N> {
+    /// The layers from near to far.
+    type Pixel = Vec<Layer>;
+
+    fn layout(&self) -> Layout {
+        self.0.layout()
+    }
+
+    fn clear(&self, _site: Site) -> Vec<Layer> {
+        Vec::new()
+    }
+
+    fn draw<P: Probe>(
+        &self,
+        _pass: u32,
+        _site: Site,
+        layers: &mut Vec<Layer>,
+        fragment: &Fragment,
+        probe: &mut P,
+    ) {
+        let layer = self.0.columns.layer(fragment);
+        if let Some(furthest) = self.0.insert(layers, layer, probe)
+            && let Some(last) = layers.last_mut()
+        {
+            *last = self.0.columns.stored(last.merged(&furthest));
+            // Where all moved, the last was read and is written anyway.
+            if furthest == layer {
+                probe.state(self.0.bits - 32, self.0.bits);
+            }
+        }
+        probe.written(fragment.coverage);
+    }
+
+    fn resolve(&self, _site: Site, layers: &Vec<Layer>, behind: &[[f32; 3]; N]) -> [f64; 3] {
+        self.0.resolve(layers, behind)
+    }
+
+    fn contents(&self, layers: &Vec<Layer>) -> Contents {
+        contents(layers)
+    }
+}
+
+impl<const N: usize> OnDevice<Vec<Layer>> for MlabAt<N> {
+    fn declare(&self, to: &mut Declaration) {
+        self.0.declare(to);
+    }
+
+    fn read(&self, site: Site, from: &PixelWords<'_>) -> Vec<Layer> {
+        self.0.read(site, from)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::configure;
+    use screendoor_rop::{Frame, draw_pixel};
+    use screendoor_trace::tile::TileGrid;
+    use screendoor_trace::trace::{DepthPlane, SampleMask, Unorm32};
+
+    #[test]
+    fn a_merge_by_hand() {
+        let frame = Frame {
+            grid: TileGrid::new(1, 1),
+            positions: [[0, 0]].into(),
+            background: [1.0; 3],
+            seed: 0,
+            colour_bits: 48,
+            opaque: true,
+            primitive_depths: None,
+        };
+        let fragment = |z: u32, colour: f32, alpha: f32| Fragment {
+            x: 0,
+            y: 0,
+            coverage: SampleMask::first(1),
+            depth: DepthPlane { z: Unorm32(z), dzdx: 0, dzdy: 0 },
+            colour: [colour; 3],
+            alpha,
+            primitive: z,
+            object: 0,
+        };
+        let design = configure("mlab:layers=2", &[]).unwrap();
+        let design = Mlab::at::<1>(design.values(), &frame).unwrap();
+        let site = Site { x: 0, y: 0 };
+        let resolve = |fragments: &[Fragment]| {
+            use screendoor_rop::Design;
+            design.resolve(site, &draw_pixel(&design, site, fragments))[0]
+        };
+        let (a, b, c) = (fragment(1, 1.0, 0.5), fragment(2, 0.0, 0.5), fragment(3, 1.0, 0.25));
+        // 0.5 + 0.5·(0 + 0.5·(0.25 + 0.75·1)) = 0.75, exactly, while the last two that are
+        // merged are neighbours.
+        assert_eq!(resolve(&[a, b, c]), 0.75);
+        assert_eq!(resolve(&[c, b, a]), 0.75);
+        // The first and the third merge at the first's depth, 0.5 + 0.5·0.25 over
+        // 0.375, and the second comes to lie behind both, where it merges with them:
+        // 0.625 + 0.375·(0 + 0.5·1).
+        let d = fragment(0, 0.0, 0.0);
+        assert_eq!(resolve(&[d, a, c, b]), 0.8125);
+    }
+}

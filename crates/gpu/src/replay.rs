@@ -1,0 +1,501 @@
+//! Replaying a trace on a GPU: chunk by chunk, sorted by pixel there, a thread for each
+//! pixel; the pixels' state stays on the device.
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use screendoor_designs::Configured;
+use screendoor_trace::error::Result;
+use crate::bin::{Binner, Scratch, Sorted, uniform};
+use crate::chunk::{Chunks, Uploaded};
+use crate::device::{Access, Gpu, most_bytes};
+use crate::params::Params;
+use crate::shader;
+use crate::time::Timer;
+use screendoor_trace::picture::{Picture, TilePixels};
+use screendoor_rop::{Constant, Frame, Port, Replayed, Shader, TileState, TileWords};
+use screendoor_trace::tile::{TILE_PIXELS, TileId, TileMap};
+use screendoor_trace::trace::Trace;
+
+screendoor_trace::options! {
+    /// What a thread is given. Pixels measure faster at every sample count (docs/PERFORMANCE.md).
+    pub enum Threads {
+        Pixel = "pixel": "a pixel",
+        Sample = "sample": "a sample, where the design is for it; those of a pixel work together",
+    }
+}
+
+/// How to replay on a GPU; none of it changes the picture.
+#[derive(Clone, Copy)]
+pub struct GpuOptions<'a> {
+    /// What a thread is given.
+    pub threads: Threads,
+    /// Rows of a chunk, at most; fewer where a buffer holds fewer.
+    pub rows: u64,
+    /// Bytes of chunks that stay on the device for the next pass.
+    pub resident: u64,
+    /// Is told how many fragments have been drawn, of how many.
+    pub progress: &'a (dyn Fn(u64, u64) + Sync),
+}
+
+impl Default for GpuOptions<'_> {
+    fn default() -> Self {
+        let threads = Threads::Pixel;
+        GpuOptions { threads, rows: u64::MAX, resident: 1 << 31, progress: &|_, _| () }
+    }
+}
+
+/// Where the time of a replay went, in seconds.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct GpuSeconds {
+    /// The whole, by the clock on the wall.
+    pub wall: f64,
+    /// Reading the file and bringing it to the device.
+    pub upload: f64,
+    /// Bringing the picture back, or the state, and resolving it.
+    pub back: f64,
+    /// By the device's clock, where it has one: `bin`, `draw` and others.
+    pub device: Option<BTreeMap<&'static str, f64>>,
+}
+
+/// A replay on a GPU, its state still there.
+pub struct GpuRun<'a> {
+    gpu: &'a Gpu,
+    port: &'a Port,
+    frame: &'a Frame,
+    params: Params,
+    programs: Programs,
+    timer: Timer,
+    pages: Vec<Page>,
+    /// The touched tiles, in the order of their places.
+    tiles: Vec<TileId>,
+    tile_of: wgpu::Buffer,
+    /// Fragments drawn, over all passes.
+    fragments: u64,
+    seconds: GpuSeconds,
+    start: Instant,
+}
+
+/// The state of some tiles' pixels.
+struct Page {
+    state: wgpu::Buffer,
+    /// Its first tile's place, and how many it holds.
+    first: usize,
+    tiles: usize,
+}
+
+/// A chunk on the device, sorted.
+struct Ready {
+    uploaded: Uploaded,
+    sorted: Sorted,
+}
+
+/// A program of a design.
+struct Program {
+    /// As what its time is counted.
+    name: &'static str,
+    pipeline: wgpu::ComputePipeline,
+    /// Pixels that a group is given.
+    pixels: usize,
+}
+
+/// The design's programs.
+struct Programs {
+    layout: wgpu::BindGroupLayout,
+    clear: Program,
+    draw: Program,
+    /// How many fragments of each pixel are drawn at a time.
+    fragments: u32,
+    end_pass: Option<Program>,
+    resolve: Option<Program>,
+    tables: wgpu::Buffer,
+    /// What is bound where a program looks at nothing: to read from, and to write to.
+    nothing: [wgpu::Buffer; 2],
+}
+
+/// Loop iterations of a thread, at most. Mesa's software driver ends all loops of a thread
+/// without a word after 65535 of them, and others take a device for lost that is busy for
+/// seconds.
+const ITERATIONS: u32 = 60_000;
+
+/// Rows of a chunk, at most, whatever a buffer holds: shaders count them in 32 bits.
+const MAX_ROWS: u64 = 1 << 30;
+
+/// Threads of a group of `shaders/replay.wgsl`.
+const GROUP: usize = 64;
+
+/// Replays `trace` through a design on a GPU: the result, where the time went, and how many fragments
+/// were drawn over all passes.
+///
+/// # Errors
+/// As [`Configured::port`], [`Frame::of`] and [`GpuRun::new`].
+pub fn replay(
+    gpu: &Gpu,
+    design: &Configured,
+    trace: &Trace,
+    samples: u32,
+    seed: u32,
+    options: &GpuOptions<'_>,
+) -> Result<(Replayed, GpuSeconds, u64)> {
+    let frame = design.frame(trace, samples, seed)?;
+    let port = design.port(&frame)?;
+    let mut run = GpuRun::new(gpu, &port, &frame, trace, options)?;
+    let picture = run.picture()?;
+    let replayed = Replayed {
+        picture,
+        events: None,
+        state_bits: port.plain.state_bits(),
+        layout: port.plain.layout(),
+        passes: port.plain.passes(),
+        touched_tiles: run.touched_tiles(),
+    };
+    Ok((replayed, run.seconds().clone(), run.fragments()))
+}
+
+impl Programs {
+    fn new(
+        gpu: &Gpu,
+        port: &Port,
+        frame: &Frame,
+        chunks: &Chunks,
+        threads: Threads,
+    ) -> Result<Self> {
+        let samples = frame.samples();
+        let source = source(&[port.program], port, samples, chunks.types());
+        use Access::{Read, Uniform, Write};
+        let bindings = [Uniform, Read, Read, Write, Read, Read, Read, Write];
+        let layout = gpu.layout(&(0..).zip(bindings).collect::<Vec<_>>());
+        let program = |name| -> Result<Program> {
+            Ok(Program { name, pipeline: gpu.pipeline(&source, name, &layout)?, pixels: GROUP })
+        };
+        let by_sample = threads == Threads::Sample && port.by_sample;
+        let (draw, iterations) = if by_sample {
+            let file = lanes_file(gpu, samples);
+            let source =
+                self::source(&[port.program, shader::named(file)], port, samples, chunks.types());
+            let pipeline = gpu.pipeline(&source, "draw_lanes", &layout)?;
+            // Two loops over the samples, and what a reference value may take.
+            let iterations = 2 * samples + u32::BITS;
+            (Program { name: "draw", pipeline, pixels: GROUP / samples as usize }, iterations)
+        } else {
+            (program("draw")?, port.iterations)
+        };
+        let storage = wgpu::BufferUsages::STORAGE;
+        Ok(Programs {
+            clear: program("clear")?,
+            draw,
+            fragments: (ITERATIONS / (iterations + 1)).max(1),
+            end_pass: port.ends_passes.then(|| program("end_pass")).transpose()?,
+            resolve: port.resolves.then(|| program("resolve")).transpose()?,
+            tables: gpu.filled("tables", bytemuck::cast_slice(&tables(port, frame)), storage)?,
+            nothing: [gpu.buffer("nothing", 8, storage)?, gpu.buffer("nothing", 8, storage)?],
+            layout,
+        })
+    }
+}
+
+/// How the threads of a pixel look at each other's values.
+fn lanes_file(gpu: &Gpu, samples: u32) -> &'static str {
+    let [least, most] = gpu.adapter().subgroup;
+    // A group must be made of whole subgroups, and these of whole pixels.
+    let fits = |size: u32| size >= samples && size <= GROUP as u32 && size.is_power_of_two();
+    match gpu.has_subgroups() && fits(least) && fits(most) {
+        true => "lanes_subgroup",
+        false => "lanes_workgroup",
+    }
+}
+
+/// The text of a design's program for a trace's columns.
+pub(super) fn source(
+    files: &[Shader],
+    port: &Port,
+    samples: u32,
+    types: impl Iterator<Item = (String, Constant)>,
+) -> String {
+    let mut constants = port.constants.clone();
+    constants.extend(types);
+    constants.extend(port.places());
+    shader::program(files, samples, &constants)
+}
+
+/// The samples' places and what else the design asks for.
+fn tables(port: &Port, frame: &Frame) -> Vec<u32> {
+    let place = |[x, y]: &[i8; 2]| u32::from(*x as i16 as u16) | u32::from(*y as i16 as u16) << 16;
+    let places = frame.positions.iter().map(place);
+    let ranks = port.ranks.into_iter().flatten().copied().collect::<Vec<u16>>();
+    places.chain(ranks.chunks(2).map(|r| u32::from(r[0]) | u32::from(r[1]) << 16)).collect()
+}
+
+impl<'a> GpuRun<'a> {
+    /// Draws all of `trace`.
+    ///
+    /// # Errors
+    /// As [`Trace::batch`]; [`screendoor_trace::error::Error::Gpu`] where the device fails.
+    pub fn new(
+        gpu: &'a Gpu,
+        port: &'a Port,
+        frame: &'a Frame,
+        trace: &Trace,
+        options: &GpuOptions<'_>,
+    ) -> Result<Self> {
+        let start = Instant::now();
+        let bytes = most_bytes(&gpu.device);
+        // Behind the keys stands their number.
+        let chunks = Chunks::of(trace, bytes, options.rows.min(bytes / 4 - 1).min(MAX_ROWS));
+        let mut run = GpuRun {
+            gpu,
+            port,
+            frame,
+            params: Params::of(frame),
+            programs: Programs::new(gpu, port, frame, &chunks, options.threads)?,
+            timer: Timer::new(gpu)?,
+            pages: Vec::new(),
+            tiles: Vec::new(),
+            tile_of: gpu.buffer("tiles", 4, wgpu::BufferUsages::STORAGE)?,
+            fragments: 0,
+            seconds: GpuSeconds::default(),
+            start,
+        };
+        run.draw_all(trace, &chunks, options)?;
+        gpu.wait("drawing")?;
+        Ok(run)
+    }
+
+    fn draw_all(&mut self, trace: &Trace, chunks: &Chunks, options: &GpuOptions<'_>) -> Result<()> {
+        let constants: Vec<_> = chunks.types().collect();
+        let binner = Binner::new(self.gpu, self.frame.samples(), &constants)?;
+        let most = (0..chunks.len()).map(|i| chunks.rows(i)).max().unwrap_or(0);
+        let scratch = Scratch::new(self.gpu, most)?;
+        let mut slots = vec![0_u32; self.frame.grid.count()];
+        let mut kept: Vec<Option<Ready>> = Vec::new();
+        let mut left = options.resident;
+        let passes = self.port.plain.passes();
+        let (mut done, total) = (0, trace.rows() * u64::from(passes));
+        for pass in 0..passes {
+            self.params.pass_number = pass;
+            for i in 0..chunks.len() {
+                let fresh = match kept.get(i) {
+                    Some(Some(_)) => None,
+                    _ => {
+                        let begun = Instant::now();
+                        let uploaded = chunks.upload(self.gpu, trace, i, &self.params)?;
+                        self.gpu.wait("uploading")?;
+                        self.seconds.upload += begun.elapsed().as_secs_f64();
+                        if pass == 0 {
+                            self.touch(&binner, &uploaded, &mut slots)?;
+                        }
+                        Some(self.sort(&binner, &scratch, uploaded, &slots)?)
+                    }
+                };
+                let ready = fresh.as_ref().or_else(|| kept[i].as_ref()).expect("one of the two");
+                self.draw(ready)?;
+                self.fragments += u64::from(ready.sorted.kept);
+                if pass == 0 && passes > 1 {
+                    let fits = chunks.bytes(i) <= left;
+                    left -= if fits { chunks.bytes(i) } else { 0 };
+                    kept.push(fresh.filter(|_| fits));
+                }
+                done += chunks.rows(i) as u64;
+                (options.progress)(done, total);
+            }
+            if let Some(program) = &self.programs.end_pass {
+                self.for_all_pages(program, None)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Makes room for the tiles that a chunk is the first to touch.
+    fn touch(&mut self, binner: &Binner, chunk: &Uploaded, slots: &mut [u32]) -> Result<()> {
+        let bits = binner.touched(self.gpu, &self.timer, chunk, slots.len())?;
+        let first = self.tiles.len();
+        for (tile, slot) in slots.iter_mut().enumerate() {
+            let touched = bits[tile / 32] >> (tile % 32) & 1 == 1;
+            let known = self.tiles.get(*slot as usize) == Some(&TileId(tile as u32));
+            if touched && !known {
+                *slot = self.tiles.len() as u32;
+                self.tiles.push(TileId(tile as u32));
+            }
+        }
+        if first == self.tiles.len() {
+            return Ok(());
+        }
+        let tiles: Vec<u32> = self.tiles.iter().map(|tile| tile.0).collect();
+        let usage = wgpu::BufferUsages::STORAGE;
+        self.tile_of = self.gpu.filled("tiles", bytemuck::cast_slice(&tiles), usage)?;
+        let words = u64::from(self.port.words()) * TILE_PIXELS as u64;
+        let most = ((most_bytes(&self.gpu.device) / (4 * words.max(3))) as usize).max(1);
+        let mut at = first;
+        while at < self.tiles.len() {
+            let tiles = most.min(self.tiles.len() - at);
+            let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
+            let state = self.gpu.buffer("state", 4 * words * tiles as u64, usage)?;
+            self.pages.push(Page { state, first: at, tiles });
+            let page = self.pages.len() - 1;
+            self.run_on(page, &self.programs.clear, None, None)?;
+            at += tiles;
+        }
+        Ok(())
+    }
+
+    fn sort(
+        &self,
+        binner: &Binner,
+        scratch: &Scratch,
+        uploaded: Uploaded,
+        slots: &[u32],
+    ) -> Result<Ready> {
+        let usage = wgpu::BufferUsages::STORAGE;
+        let slots = self.gpu.filled("tiles' places", bytemuck::cast_slice(slots), usage)?;
+        let places = (&slots, self.tiles.len());
+        let sorted = binner.sort(self.gpu, &self.timer, scratch, &uploaded, places)?;
+        Ok(Ready { uploaded, sorted })
+    }
+
+    /// Draws a chunk, so many fragments of each pixel at a time that no driver loses
+    /// patience.
+    fn draw(&self, chunk: &Ready) -> Result<()> {
+        let fragments = self.programs.fragments;
+        for from in (0..chunk.sorted.longest).step_by(fragments as usize) {
+            let mut part = chunk.uploaded.params;
+            part.from_fragment = from;
+            part.fragments = fragments;
+            self.for_all_pages(&self.programs.draw, Some((chunk, part)))?;
+        }
+        Ok(())
+    }
+
+    fn for_all_pages(&self, program: &Program, chunk: Option<(&Ready, Params)>) -> Result<()> {
+        let mut pages = 0..self.pages.len();
+        pages.try_for_each(|page| self.run_on(page, program, chunk, None))
+    }
+
+    /// Runs a program for the pixels of a page, as far as the chunk knows them.
+    fn run_on(
+        &self,
+        page: usize,
+        program: &Program,
+        chunk: Option<(&Ready, Params)>,
+        picture: Option<&wgpu::Buffer>,
+    ) -> Result<()> {
+        let Page { state, first, tiles } = &self.pages[page];
+        let (first_pixel, pixels) = (first * TILE_PIXELS, tiles * TILE_PIXELS);
+        let known = chunk.map_or(usize::MAX, |(chunk, _)| chunk.sorted.pixels as usize);
+        let taken = pixels.min(known.saturating_sub(first_pixel));
+        if taken == 0 {
+            return Ok(());
+        }
+        let params = Params {
+            pass_number: self.params.pass_number,
+            first_pixel: first_pixel as u32,
+            pixels: pixels as u32,
+            taken: taken as u32,
+            ..chunk.map_or(self.params, |(_, params)| params)
+        };
+        let chunk = chunk.map(|(chunk, _)| chunk);
+        // What is not there is not read.
+        let [nothing, nowhere] = &self.programs.nothing;
+        let buffers = [
+            (0, &uniform(self.gpu, &params)?),
+            (1, chunk.map_or(nothing, |chunk| &chunk.uploaded.columns)),
+            (2, &self.programs.tables),
+            (3, state),
+            (4, chunk.map_or(nothing, |chunk| &chunk.sorted.rows)),
+            (5, chunk.map_or(nothing, |chunk| &chunk.sorted.ends)),
+            (6, &self.tile_of),
+            (7, picture.unwrap_or(nowhere)),
+        ];
+        let bound = self.gpu.bind(&self.programs.layout, &buffers);
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        let groups = taken.div_ceil(program.pixels) as u64;
+        let Program { name, pipeline, .. } = program;
+        self.timer.run(self.gpu, &mut encoder, name, (pipeline, &bound), groups);
+        self.gpu.submit(encoder, program.name)
+    }
+
+    /// How many tiles hold a fragment.
+    pub fn touched_tiles(&self) -> usize {
+        self.tiles.len()
+    }
+
+    /// How many fragments were drawn; over several passes each counts several times.
+    pub fn fragments(&self) -> u64 {
+        self.fragments
+    }
+
+    /// Where the time went, until the picture was made; before, reading and upload alone.
+    pub fn seconds(&self) -> &GpuSeconds {
+        &self.seconds
+    }
+
+    /// Brings the state back and hands each tile's to `look`, as the plain text holds it.
+    ///
+    /// # Errors
+    /// [`screendoor_trace::error::Error::Gpu`] where the device fails.
+    pub fn states<T: Send>(
+        &self,
+        look: impl Fn(TileId, TileState) -> T + Sync,
+    ) -> Result<Vec<(TileId, T)>> {
+        let mut all = Vec::with_capacity(self.tiles.len());
+        for page in &self.pages {
+            let stride = page.tiles * TILE_PIXELS;
+            let tiles = &self.tiles[page.first..page.first + page.tiles];
+            let found: Vec<_> = self.gpu.read(&page.state, "bringing the state back", |words| {
+                let tile = |(i, tile): (usize, &TileId)| {
+                    let words = TileWords { words, stride, first: i * TILE_PIXELS };
+                    (*tile, look(*tile, self.port.restore(self.frame.grid, *tile, words)))
+                };
+                tiles.par_iter().enumerate().map(tile).collect()
+            })?;
+            all.extend(found);
+        }
+        Ok(all)
+    }
+
+    /// The picture: of the device's own sums where they are the plain text's, and else
+    /// resolved by the plain text.
+    ///
+    /// # Errors
+    /// As [`GpuRun::states`].
+    pub fn picture(&mut self) -> Result<Picture> {
+        let begun = Instant::now();
+        let grid = self.frame.grid;
+        let tiles = match &self.programs.resolve {
+            Some(program) => self.resolved(program)?,
+            None => self.states(|tile, state| self.port.plain.resolve(grid, tile, &state))?,
+        };
+        let mut finished: TileMap<TilePixels> = TileMap::new(grid);
+        for (tile, pixels) in tiles {
+            finished.get_or_insert_with(tile, || pixels);
+        }
+        self.seconds.device = self.timer.seconds(self.gpu)?;
+        self.seconds.back = begun.elapsed().as_secs_f64();
+        self.seconds.wall = self.start.elapsed().as_secs_f64();
+        Ok(Picture::from_tiles(self.frame.background.map(f64::from), finished))
+    }
+
+    fn resolved(&self, program: &Program) -> Result<Vec<(TileId, TilePixels)>> {
+        let mut all = Vec::with_capacity(self.tiles.len());
+        for (i, page) in self.pages.iter().enumerate() {
+            let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
+            let bytes = (12 * page.tiles * TILE_PIXELS) as u64;
+            let picture = self.gpu.buffer("the picture", bytes, usage)?;
+            self.run_on(i, program, None, Some(&picture))?;
+            let tiles = &self.tiles[page.first..page.first + page.tiles];
+            self.gpu.read(&picture, "bringing the picture back", |words| {
+                for (tile, words) in tiles.iter().zip(words.chunks_exact(3 * TILE_PIXELS)) {
+                    let colour = |i: usize| f64::from(f32::from_bits(words[i]));
+                    let mut pixels: TilePixels = Box::new([[0.0; 3]; TILE_PIXELS]);
+                    for (i, pixel) in pixels.iter_mut().enumerate() {
+                        *pixel = std::array::from_fn(|c| colour(3 * i + c));
+                    }
+                    all.push((*tile, pixels));
+                }
+            })?;
+        }
+        Ok(all)
+    }
+}

@@ -1,0 +1,257 @@
+//! Results as Markdown: for people, and for notes and issues.
+
+use screendoor_study::metrics::Estimate;
+use crate::html::words::{counted, figures, fixed};
+use crate::markdown_table;
+use screendoor_study::study::record::Record;
+use screendoor_study::study::results::{Missing, Results};
+
+/// What has no figure.
+const NONE: &str = "—";
+
+/// The study, a table for each scene and sample count, the machine, and what is missing.
+pub fn markdown(results: &Results) -> String {
+    let study = &results.study;
+    let mut text = format!("# {}\n", escaped(&study.name));
+    paragraph(&mut text, &prose(study.description.trim()));
+    let how = format!(
+        "{} from {}, where a seed changes anything. Errors are over the covered pixels, against \
+         the exact picture of the same samples, on linear values in units of 1/255, ± half of \
+         the 95 % interval; the mean error is picture minus exact picture, with its sign. Everything but times is the same on every machine.",
+        counted(study.seeds as usize, "seed"),
+        study.first_seed
+    );
+    paragraph(&mut text, &how);
+    for scene in &study.scenes {
+        for samples in &study.samples {
+            let heading = format!("{}, {}", scene.name, counted(*samples as usize, "sample"));
+            paragraph(&mut text, &format!("## {}", escaped(&heading)));
+            paragraph(&mut text, &table(results, &scene.name, *samples));
+        }
+    }
+    paragraph(&mut text, "## Machine");
+    let facts = results.machine.facts();
+    let facts = facts.iter().map(|(name, value)| vec![escaped(name), escaped(value)]);
+    paragraph(&mut text, &markdown_table(&["", ""], &facts.collect::<Vec<_>>()));
+    paragraph(&mut text, "## Missing");
+    paragraph(&mut text, &missing(&results.missing));
+    text
+}
+
+fn paragraph(text: &mut String, paragraph: &str) {
+    if !paragraph.is_empty() {
+        text.push_str(&format!("\n{}\n", paragraph.trim_end()));
+    }
+}
+
+/// A column's cell for a record; `None` where it has no figure.
+type Figure = fn(&Record) -> Option<String>;
+
+/// The columns between the design and the times.
+const COLUMNS: &[(&str, Figure)] = &[
+    ("RMSE", |r| with_error(r.covered.rmse)),
+    ("mean error", |r| with_error(r.covered.mean).filter(|_| !r.is_one_draw())),
+    ("FLIP", |r| with_error(r.flip?.mean)),
+    ("RMSE after Gaussian of 1 pixel", |r| filtered(r, 1.0)),
+    ("of 2 pixels", |r| filtered(r, 2.0)),
+    ("blueness, dB", |r| with_error(r.spectrum.as_ref()?.blueness?)),
+    ("state, bytes/pixel", |r| Some(r.state_bytes().map_or("grows".into(), figures))),
+    ("passes", |r| Some(r.passes.to_string())),
+    ("moved, bytes/fragment", |r| r.bytes_moved_per_fragment().map(figures)),
+    ("hashes/fragment", |r| r.hashes_per_fragment().map(figures)),
+    ("comparators/fragment", |r| r.comparators_per_fragment().map(figures)),
+];
+
+fn table(results: &Results, scene: &str, samples: u32) -> String {
+    let engines = results.engines();
+    let times: Vec<String> =
+        engines.iter().map(|e| escaped(&format!("{e}, ns/fragment"))).collect();
+    let mut header = vec!["design"];
+    header.extend(COLUMNS.iter().map(|(name, _)| name));
+    header.extend(times.iter().map(String::as_str));
+    let row = |series: &String| -> Vec<String> {
+        let Some(record) = results.record(scene, series, samples) else {
+            let of = |m: &&Missing| m.scene == scene && m.series == *series && m.samples == samples;
+            let why = results.missing.iter().find(of).map_or("not run yet", Missing::reason);
+            let mut cells = vec![escaped(&format!("{series} (missing: {why})"))];
+            cells.resize(header.len(), NONE.into());
+            return cells;
+        };
+        let time = |engine| Some(figures(record.nanoseconds_per_fragment(engine)?.median));
+        let mut cells = vec![Some(escaped(series))];
+        cells.extend(COLUMNS.iter().map(|(_, of)| of(record)));
+        cells.extend(engines.iter().map(|e| time(e)));
+        cells.into_iter().map(|cell| cell.unwrap_or(NONE.into())).collect()
+    };
+    markdown_table(&header, &results.study.designs.iter().map(row).collect::<Vec<_>>())
+}
+
+fn filtered(record: &Record, sigma: f64) -> Option<String> {
+    with_error(record.filtered.iter().find(|f| f.sigma == sigma)?.rmse)
+}
+
+/// An estimate and half of its interval; `None` where it is not known.
+fn with_error(e: Estimate) -> Option<String> {
+    let half = (e.high - e.low) / 2.0;
+    if e.value.is_nan() {
+        return None;
+    }
+    if !half.is_finite() || half == 0.0 {
+        return Some(figures(e.value));
+    }
+    // As many decimals as the half-width needs for two digits that count.
+    let decimals = (1 - half.log10().floor() as i32).clamp(0, 6) as usize;
+    Some(format!("{} ± {}", fixed(e.value, decimals), fixed(half, decimals)))
+}
+
+fn missing(list: &[Missing]) -> String {
+    if list.is_empty() {
+        return "None: every run of the study has a result.".into();
+    }
+    let row = |m: &Missing| {
+        let [scene, series, why] = [&m.scene, &m.series, m.reason()].map(escaped);
+        vec![scene, series, m.samples.to_string(), why]
+    };
+    let rows: Vec<_> = list.iter().map(row).collect();
+    markdown_table(&["scene", "design", "samples", "why"], &rows)
+}
+
+/// A text that stays within its cell or heading, and is no markup.
+fn escaped(text: &str) -> String {
+    let mut safe = String::new();
+    for c in text.chars() {
+        match c {
+            '\n' | '\r' => safe.push(' '),
+            '|' | '<' | '&' | '\\' | '`' | '*' | '[' => {
+                safe.push_str(&format!("&#{};", u32::from(c)));
+            }
+            c => safe.push(c),
+        }
+    }
+    safe
+}
+
+/// A text of several sentences as one paragraph that is no markup.
+fn prose(text: &str) -> String {
+    let mut safe = String::new();
+    for c in escaped(text).chars() {
+        match c {
+            '_' | '~' | '$' | ']' | '>' => safe.push_str(&format!("&#{};", u32::from(c))),
+            c => safe.push(c),
+        }
+    }
+    // At a line's start other characters make headings, lists and lines.
+    let digits = safe.len() - safe.trim_start_matches(|c: char| c.is_ascii_digit()).len();
+    let at = if safe[digits..].starts_with(['.', ')']) { digits } else { 0 };
+    match safe[at..].chars().next() {
+        Some(c) if matches!(c, '#' | '+' | '-' | '=' | ':') || at > 0 => {
+            safe.replace_range(at..=at, &format!("&#{};", u32::from(c)));
+        }
+        _ => {}
+    }
+    safe
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use screendoor_study::study::analysis::made_up::plausible;
+
+    /// What a browser makes of a description, without its paragraph's tags.
+    fn shown(description: &str) -> String {
+        use pulldown_cmark::{Options, Parser};
+        let text = prose(description);
+        let mut page = String::new();
+        // All extensions but the one that makes other characters of dashes and quotes.
+        let options = Options::all() - Options::ENABLE_SMART_PUNCTUATION;
+        pulldown_cmark::html::push_html(&mut page, Parser::new_ext(&text, options));
+        page.trim().trim_start_matches("<p>").trim_end_matches("</p>").to_string()
+    }
+
+    #[test]
+    fn a_description_is_no_markup() {
+        for text in [
+            "Plain words, of a state-of-the-art study (8 bits).",
+            "# Not a heading",
+            "- no item",
+            "+ none",
+            "1. none",
+            "22) none",
+            "=== no underline",
+            "--- no rule",
+            "---",
+            "![picture](http://nowhere/a.png) and [link](x) and [^note]",
+            "a | b | c",
+            "*a* _b_ __c__ ~~d~~ `e` $f$ \\g",
+        ] {
+            assert_eq!(shown(text), text, "{text}");
+        }
+        assert_eq!(shown("one\n\n# two\r\n- three"), "one  # two  - three");
+        assert_eq!(shown("<script>x</script> &amp;"), "&lt;script&gt;x&lt;/script&gt; &amp;amp;");
+        assert_eq!(shown("> a"), "&gt; a");
+    }
+
+    /// A table row's cells.
+    fn cells(line: &str) -> Vec<&str> {
+        line.trim_matches('|').split('|').map(str::trim).collect()
+    }
+
+    #[test]
+    fn every_run_has_its_row_and_every_row_its_cells() {
+        let results = plausible(8, 16, &[8, 16]);
+        let text = markdown(&results);
+        let mut rows = 0;
+        for part in text.split("\n## ").filter(|p| p.contains("| design | RMSE |")) {
+            let (heading, _) = part.split_once('\n').unwrap();
+            let (scene, samples) = heading.split_once(", ").unwrap();
+            let samples = samples.split(' ').next().unwrap().parse().unwrap();
+            let lines: Vec<&str> = part.lines().filter(|l| l.starts_with('|')).collect();
+            for (line, series) in lines[2..].iter().zip(&results.study.designs) {
+                let cells = cells(line);
+                assert_eq!(cells.len(), 1 + COLUMNS.len() + 2, "{line}");
+                match results.record(scene, series, samples) {
+                    Some(r) => {
+                        assert_eq!(cells[0], series);
+                        assert_eq!(cells[1], with_error(r.covered.rmse).unwrap());
+                        assert_eq!(cells[8], r.passes.to_string());
+                    }
+                    None => {
+                        assert!(cells[0].starts_with(&format!("{series} (missing: ")), "{line}");
+                        assert_eq!(cells[1], NONE);
+                    }
+                }
+                rows += 1;
+            }
+        }
+        assert_eq!(rows, 8 * 2 * 16);
+        assert!(text.contains("(missing: ran out of memory)"));
+        assert!(text.contains("| oak | hybrid:layers={n} | 8 | not run yet |"), "{text}");
+        assert!(text.contains("| Processor | a processor |"));
+    }
+
+    #[test]
+    fn files_cannot_break_the_tables() {
+        let mut results = plausible(8, 16, &[8]);
+        results.study.name = "a\n# b".into();
+        for missing in &mut results.missing {
+            missing.why = Some("a | b\\|\r\n| c | <i>".into());
+        }
+        let text = markdown(&results);
+        assert!(text.starts_with("# a # b\n"));
+        let lines = text.lines().filter(|l| l.contains("b&#92;&#124;  &#124; c")).count();
+        assert_eq!(lines, 2 * results.missing.len());
+        let per_row: Vec<usize> =
+            text.lines().filter(|l| l.starts_with('|')).map(|l| cells(l).len()).collect();
+        assert!(per_row.iter().all(|n| [2, 4, 1 + COLUMNS.len() + 2].contains(n)), "{per_row:?}");
+        assert!(!text.contains("<i>"));
+    }
+
+    #[test]
+    fn errors_have_their_half_width() {
+        let e = |value, low, high| with_error(Estimate { value, low, high });
+        assert_eq!(e(12.345, 12.2, 12.5).unwrap(), "12.35 ± 0.15");
+        assert_eq!(e(12.345, 12.345, 12.345).unwrap(), "12.3");
+        assert_eq!(e(-1.0, f64::NEG_INFINITY, f64::INFINITY).unwrap(), "−1.00");
+        assert_eq!(e(f64::NAN, 0.0, 1.0), None);
+    }
+}

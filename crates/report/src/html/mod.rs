@@ -1,0 +1,26 @@
+//! A study's results as one page: a single file that needs no network, for screen, phone
+//! and paper.
+
+mod about;
+mod against;
+mod choice;
+mod convergence;
+mod cost;
+mod error;
+mod markdown;
+pub mod packed;
+mod page;
+mod parts;
+mod perception;
+mod reproduce;
+#[cfg(test)]
+mod tests;
+pub mod verification;
+pub mod viewer;
+pub(crate) mod words;
+
+pub use choice::answer;
+pub use markdown::Figure;
+pub use page::{DesignText, Extras, Place, Section, page};
+pub use parts::replay_command;
+pub use words::grouped;

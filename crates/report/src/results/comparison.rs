@@ -1,0 +1,305 @@
+//! The results' part on all designs over the same fragments.
+
+use std::fmt::Write;
+
+use crate::markdown_table;
+use crate::results::against::below;
+use crate::results::ratios::OnScenes;
+use crate::results::slab;
+use screendoor_study::study::comparison::{ComparedScene, Comparison, Duel, Outcome};
+
+/// Counts of the printed tables.
+const SHOWN: [u32; 3] = [4, 8, 16];
+/// Budgets of state in bytes per pixel of the table of winners.
+const BUDGETS: [f64; 5] = [48.0, 96.0, 192.0, 384.0, 768.0];
+
+/// The text of the part.
+pub(super) fn text(c: &Comparison, folder: &str) -> String {
+    let mut text = String::new();
+    preamble(&mut text, c);
+    for count in SHOWN {
+        table(&mut text, c, count);
+    }
+    methods(&mut text, c);
+    winners(&mut text, c);
+    duels(&mut text, c);
+    text.push_str(&slab::text(c, folder));
+    text
+}
+
+fn preamble(text: &mut String, c: &Comparison) {
+    let _ = writeln!(
+        text,
+        "## All designs over the same fragments\n\n\
+         Every design of the registry with its defaults, and with each of its methods, at n \
+         samples per pixel and, where it keeps layers, n layers (`slab`: 2n coverage bits, as in \
+         Wyman's figure 1); {} × {} pixels, {} seeds of what is random. RMSE over the covered \
+         pixels against the exact picture of the same samples, in 8-bit units, and in brackets the \
+         mean error: picture minus exact picture over the covered pixels, with its sign, ± half of \
+         its 95 % interval over the seeds where seeds change anything. An interval without 0 shows \
+         a bias; errors of both signs cancel in the mean. *At equal depths*: the share of the \
+         fragments that meet another one of their depth at a sample, where promises for differing \
+         depths are not kept. *State*: bytes per pixel in hardware, without a z-buffer for opaque geometry \
+         where the scene has none. *Passes* over the trace.\n",
+        c.side, c.side, c.seeds
+    );
+    let rows: Vec<Vec<String>> = c
+        .scenes
+        .iter()
+        .map(|s| {
+            let t = &s.statistics;
+            let percent = |n: u64| format!("{:.0} %", 100.0 * n as f64 / t.fragments.max(1) as f64);
+            vec![
+                s.name.to_string(),
+                format!("{:.2} M", t.fragments as f64 / 1e6),
+                format!("{:.1}", t.depth_complexity.mean),
+                t.depth_complexity.p95.to_string(),
+                t.depth_complexity.max.to_string(),
+                format!("{:.2}", t.alpha.mean),
+                percent(t.alpha.opaque),
+                percent(t.tied_fragments),
+            ]
+        })
+        .collect();
+    let header = [
+        "scene",
+        "fragments",
+        "per covered pixel",
+        "95 %",
+        "most",
+        "mean alpha",
+        "opaque",
+        "at equal depths",
+    ];
+    text.push_str(&markdown_table(&header, &rows));
+    for missing in &c.missing {
+        let _ = writeln!(text, "\n`{missing}` was not given and is left out.");
+    }
+    text.push('\n');
+}
+
+fn bytes(r: &Outcome) -> String {
+    if r.unbounded { "grows".to_string() } else { format!("{:.0}", r.state_bytes) }
+}
+
+/// Smallest and largest of what differs from scene to scene.
+fn range(values: impl Iterator<Item = String>) -> String {
+    let mut values: Vec<String> = values.collect();
+    values.dedup();
+    let least = values.iter().min_by_key(|v| v.parse::<u64>().unwrap_or(u64::MAX));
+    let most = values.iter().max_by_key(|v| v.parse::<u64>().unwrap_or(u64::MAX));
+    match (least, most) {
+        (Some(a), Some(b)) if a == b => a.clone(),
+        (Some(a), Some(b)) => format!("{a} to {b}"),
+        _ => String::new(),
+    }
+}
+
+fn table(text: &mut String, c: &Comparison, count: u32) {
+    let _ = writeln!(text, "### {count} samples or layers\n");
+    let mut header = vec!["design", "state", "passes"];
+    header.extend(c.scenes.iter().map(|s| s.name));
+    let rows: Vec<Vec<String>> = (0..c.contenders.len())
+        .map(|i| {
+            let results = || c.scenes.iter().filter_map(|s| s.result(i, count));
+            let mut row = vec![
+                format!("`{}`", c.contenders[i].label),
+                range(results().map(bytes)),
+                range(results().map(|r| r.passes.to_string())),
+            ];
+            row.extend(c.scenes.iter().map(|s| s.result(i, count).map_or("—".into(), cell)));
+            row
+        })
+        .collect();
+    text.push_str(&markdown_table(&header, &rows));
+    text.push('\n');
+}
+
+fn cell(r: &Outcome) -> String {
+    let (rmse, mean) = (r.errors.rmse.value, r.errors.mean);
+    let half = match mean.half_width() {
+        0.0 => String::new(),
+        half => format!(" ± {half:.2}"),
+    };
+    format!("{rmse:.1} ({:+.2}{half})", mean.value)
+}
+
+/// The ratio of two contenders' errors on every scene.
+fn ratios(c: &Comparison, a: usize, b: usize, count: u32) -> OnScenes {
+    let ratio = |s: &ComparedScene| {
+        let error = |i| s.result(i, count).map(|r| r.errors.rmse);
+        Some((s.name.to_string(), error(a)?.ratio(error(b)?)))
+    };
+    OnScenes(c.scenes.iter().filter_map(ratio).collect())
+}
+
+/// `lk` and `systematic` with each method, beside `enderton` with the same.
+fn pairs(c: &Comparison) -> Vec<(String, usize, usize)> {
+    let methods = ["", ":method=alpha-correction", ":method=depth", ":method=depth-correction"];
+    let named = methods.into_iter().flat_map(|method| {
+        ["lk", "systematic"]
+            .map(|design| (format!("{design}{method}"), format!("enderton{method}")))
+    });
+    named.filter_map(|(a, b)| Some((a.clone(), c.contender(&a)?, c.contender(&b)?))).collect()
+}
+
+/// The samples at which the methods' ratios are summed up.
+const SUMMED_UP: u32 = 8;
+
+/// What LK's and systematic samples gain, in a sentence a design.
+pub(super) fn in_short(c: &Comparison) -> Vec<String> {
+    let gains = |design: &str| {
+        let own = |name: &str| name.split(':').next() == Some(design);
+        let of = pairs(c).into_iter().filter(|(name, ..)| own(name)).map(|(name, a, b)| {
+            let list = ratios(c, a, b, SUMMED_UP);
+            format!(
+                "`{name}` {:.2} (smaller {})",
+                list.mean(),
+                list.holding(|e| below(e, 1.0)).words()
+            )
+        });
+        of.collect::<Vec<_>>().join("; ")
+    };
+    let names: Vec<&str> = c.scenes.iter().map(|s| s.name).collect();
+    let line = |design: &str| {
+        format!(
+            "**`{design}` in Enderton's methods** ({}; {} × {} pixels, {} seeds): RMSE at {SUMMED_UP} \
+             samples relative to `enderton` with the same method, in the geometric mean: {}.",
+            names.join(", "),
+            c.side,
+            c.side,
+            c.seeds,
+            gains(design)
+        )
+    };
+    ["lk", "systematic"].map(line).to_vec()
+}
+
+/// What LK's and systematic sampling gain in Enderton's methods.
+fn methods(text: &mut String, c: &Comparison) {
+    let _ = writeln!(
+        text,
+        "### LK and systematic sampling in the methods of several passes\n\n\
+         LK leave it to future work to quantify what their samples gain in the methods of \
+         Enderton et al. RMSE relative to `enderton` with the same method and samples, the \
+         geometric mean over the {} scenes of the tables above; at {SUMMED_UP} samples the range, and \
+         where it is below 1 by more than its interval.\n",
+        c.scenes.len()
+    );
+    let row = |(name, a, b): (String, usize, usize)| {
+        let of = |count| ratios(c, a, b, count);
+        let mut row = vec![format!("`{name}`")];
+        row.extend(SHOWN.into_iter().chain([32]).map(|n| match of(n) {
+            list if list.0.is_empty() => "—".to_string(),
+            list => format!("{:.3}", list.mean()),
+        }));
+        let summed_up = of(SUMMED_UP);
+        row.push(summed_up.range());
+        row.push(summed_up.holding(|e| below(e, 1.0)).words());
+        row
+    };
+    let rows: Vec<Vec<String>> = pairs(c).into_iter().map(row).collect();
+    text.push_str(&markdown_table(
+        &["design", "4", "8", "16", "32", "at 8", "smaller at 8"],
+        &rows,
+    ));
+    text.push('\n');
+}
+
+/// Designs that forget the order of fragments.
+const FORGETFUL: [&str; 2] = ["blend", "wboit"];
+
+/// Who has the least error within a budget of state.
+fn winners(text: &mut String, c: &Comparison) {
+    let [.., most] = BUDGETS;
+    let forgets = |s: &&ComparedScene| {
+        let winner = winner(c, s, most, false);
+        FORGETFUL.iter().any(|name| winner.starts_with(&format!("`{name}`")))
+    };
+    let forgetful: Vec<&str> = c.scenes.iter().filter(forgets).map(|s| s.name).collect();
+    let _ = writeln!(
+        text,
+        "### Who wins within a budget\n\n\
+         The design with the least RMSE among all whose state fits, at any of {} samples or \
+         layers; then the best of those that read the trace once. `sorted-blend` is left out: its \
+         application does the work. What forgets the order of fragments ({}) is best with the \
+         most state on {} of {} scenes: {}.\n",
+        screendoor_study::study::comparison::COUNTS.map(|n| n.to_string()).join(", "),
+        FORGETFUL.map(|name| format!("`{name}`")).join(", "),
+        forgetful.len(),
+        c.scenes.len(),
+        if forgetful.is_empty() { "none".to_string() } else { forgetful.join(", ") }
+    );
+    let budgets: Vec<String> = BUDGETS.iter().map(|b| format!("{b:.0} bytes")).collect();
+    let mut header = vec!["scene", "passes"];
+    header.extend(budgets.iter().map(String::as_str));
+    let mut rows = Vec::new();
+    for scene in &c.scenes {
+        for single in [false, true] {
+            let mut row =
+                vec![scene.name.to_string(), if single { "one" } else { "any" }.to_string()];
+            row.extend(BUDGETS.iter().map(|budget| winner(c, scene, *budget, single)));
+            rows.push(row);
+        }
+    }
+    text.push_str(&markdown_table(&header, &rows));
+    text.push('\n');
+}
+
+fn winner(c: &Comparison, scene: &ComparedScene, budget: f64, single: bool) -> String {
+    let fits = |r: &&Outcome| {
+        !r.unbounded
+            && r.state_bytes <= budget
+            && (!single || r.passes == 1)
+            && !c.contenders[r.contender].sorted_by_application
+    };
+    let best = scene
+        .results
+        .iter()
+        .filter(fits)
+        .min_by(|a, b| a.errors.rmse.value.total_cmp(&b.errors.rmse.value));
+    best.map_or("—".to_string(), |r| {
+        format!("`{}` {}: {:.1}", c.contenders[r.contender].label, r.count, r.errors.rmse.value)
+    })
+}
+
+/// Every pair at equal state.
+fn duels(text: &mut String, c: &Comparison) {
+    let _ = writeln!(
+        text,
+        "### Every pair at equal state\n\n\
+         Scenes on which the row's design has the smaller error, and on which the column's has, with \
+         the same bytes of state: the geometric mean of the ratio of their errors over the state \
+         sizes of either that lie within the range of both, errors between two counts \
+         interpolated; within 2 % neither wins. — where the ranges do not meet.\n"
+    );
+    let bounded: Vec<usize> = (0..c.contenders.len())
+        .filter(|i| {
+            c.scenes.iter().flat_map(|s| &s.results).any(|r| r.contender == *i && !r.unbounded)
+        })
+        .collect();
+    let numbers: Vec<String> = bounded.iter().map(|i| (i + 1).to_string()).collect();
+    let mut header = vec!["", "design", "won", "lost"];
+    header.extend(numbers.iter().map(String::as_str));
+    let rows: Vec<Vec<String>> = bounded
+        .iter()
+        .map(|a| {
+            let duels: Vec<Duel> = bounded.iter().map(|b| c.duel(*a, *b)).collect();
+            let sum = |of: fn(&Duel) -> u32| duels.iter().map(of).sum::<u32>().to_string();
+            let mut row = vec![
+                (a + 1).to_string(),
+                format!("`{}`", c.contenders[*a].label),
+                sum(|d| d.won),
+                sum(|d| d.lost),
+            ];
+            row.extend(bounded.iter().zip(&duels).map(|(b, d)| match d {
+                _ if a == b => String::new(),
+                Duel { won: 0, lost: 0, even: 0 } => "—".to_string(),
+                d => format!("{}:{}", d.won, d.lost),
+            }));
+            row
+        })
+        .collect();
+    text.push_str(&markdown_table(&header, &rows));
+    text.push('\n');
+}

@@ -1,0 +1,312 @@
+//! LK table 1.
+
+use std::fmt::Write;
+
+use screendoor_study::metrics::Estimate;
+use crate::markdown_table;
+use crate::results::against::{Against, Agreement, above, below};
+use crate::results::ratios::OnScenes;
+use crate::results::{plain, ratio};
+use screendoor_study::study::Run;
+use screendoor_study::study::publications::{COUNTS, DESIGNS, Publications, Published, Table1};
+
+/// The table beside the paper's.
+pub(super) fn against(p: &Publications) -> Against {
+    let [motor, cloth] = [Published::Motor, Published::Cloth].map(|column| {
+        let [first, .., last] = column.rmse().map(|[lk, comparison]| lk / comparison);
+        format!("{first:.2} to {last:.2}")
+    });
+    // By scene and count: the published ratio, `lk` ÷ `enderton`, `lk` ÷ `naive`.
+    let scenes: Vec<Vec<(f64, Estimate, Estimate)>> = p.table_1.iter().map(ratios).collect();
+    let all = || scenes.iter().flatten();
+    let measured: Vec<String> = p
+        .table_1
+        .iter()
+        .zip(&scenes)
+        .filter_map(|(table, ratios)| {
+            let ((_, e, naive), (_, last_e, last_naive)) = (ratios.first()?, ratios.last()?);
+            Some(format!(
+                "on `{}` {:.2} to {:.2} against `enderton`, {:.2} to {:.2} against `naive`",
+                table.name, e.value, last_e.value, naive.value, last_naive.value
+            ))
+        })
+        .collect();
+    let falls = |ratios: &&Vec<(f64, Estimate, Estimate)>| match ratios[..] {
+        [(_, first, _), .., (_, last, _)] => below(last, first.low),
+        _ => false,
+    };
+    let faster = scenes.iter().filter(falls).count();
+    let smaller = all().filter(|(_, e, _)| below(*e, 1.0)).count();
+    let off = |of: fn(&(f64, Estimate, Estimate)) -> f64| {
+        all().map(|row| (of(row) - row.0).abs()).fold(0.0, f64::max)
+    };
+    let (off_enderton, off_naive) = (off(|row| row.1.value), off(|row| row.2.value));
+    let statements = [faster == scenes.len(), smaller == all().count(), off_enderton < NEAR];
+    Against {
+        section: "LK table 1".to_string(),
+        source: "Laine and Karras 2011, section 5, table 1".to_string(),
+        printed: format!(
+            "LK's RMSE ÷ that of the comparison method falls from 4 to 64 samples from {motor} on \
+             MOTOR and from {cloth} on CLOTH."
+        ),
+        measured: format!("The same ratio: {}.", measured.join("; ")),
+        agreement: Agreement::of(&statements),
+        remark: format!(
+            "From 4 to 64 samples LK gains on `enderton` on {faster} of {} scenes, and its error is \
+             the smaller one in {smaller} of {} pairs of scene and sample count. The ratio itself \
+             is off the printed one by up to {off_enderton:.2}; against `naive` by up to \
+             {off_naive:.2}.",
+            scenes.len(),
+            all().count()
+        ),
+    }
+}
+
+/// Ratios of RMSE that differ by less are called the same: the scenes are others.
+const NEAR: f64 = 0.1;
+
+/// At each count the published ratio, `lk` ÷ `enderton` and `lk` ÷ `naive`.
+fn ratios(table: &Table1) -> Vec<(f64, Estimate, Estimate)> {
+    let at = |(n, [paper_lk, paper_other]): (&u32, [f64; 2])| {
+        let [lk, e, naive] = runs(table, *n).map(|r| r.rmse_fine);
+        (paper_lk / paper_other, lk.ratio(e), lk.ratio(naive))
+    };
+    COUNTS.iter().zip(table.stands_for.rmse()).map(at).collect()
+}
+
+/// Samples that LK say do the work of [`MANY`].
+const FEW: u32 = 16;
+const MANY: u32 = 64;
+
+/// `lk` with few samples ÷ a comparison with many, on every scene, and the greatest such
+/// ratio that the paper prints, which it calls quite close.
+fn few_to_many(p: &Publications, other: usize) -> OnScenes {
+    let scenes = p.table_1.iter().map(|table| {
+        let (few, many) = (runs(table, FEW)[0], runs(table, MANY)[other]);
+        (table.name.to_string(), few.rmse_fine.ratio(many.rmse_fine))
+    });
+    OnScenes(scenes.collect())
+}
+
+/// The ratios that the paper's own table prints, of MOTOR and CLOTH.
+fn printed_few_to_many() -> [f64; 2] {
+    let at = |samples| COUNTS.iter().position(|n| *n == samples).expect("the table has it");
+    [Published::Motor, Published::Cloth]
+        .map(|column| column.rmse()[at(FEW)][0] / column.rmse()[at(MANY)][1])
+}
+
+/// Whether LK with few samples is as close to another design with many as the paper's own
+/// table has it.
+fn close(ratio: Estimate) -> bool {
+    let [motor, cloth] = printed_few_to_many();
+    !above(ratio, motor.max(cloth))
+}
+
+/// LK's 16 samples beside 64 of the comparison's.
+pub(super) fn fewer_samples(p: &Publications) -> Against {
+    let [to_enderton, to_naive] = [1, 2].map(|other| few_to_many(p, other));
+    let [motor, cloth] = printed_few_to_many();
+    let holds = [&to_enderton, &to_naive].map(|list| list.holding(close));
+    let statements: Vec<bool> = holds.iter().flat_map(|h| h.each.iter().copied()).collect();
+    Against {
+        section: format!("LK's {FEW} samples and {MANY}"),
+        source: "Laine and Karras 2011, section 5, table 1".to_string(),
+        printed: format!(
+            "LK with {FEW} samples is quite close to the comparison method with {MANY} (RMSE \
+             {motor:.2} times on MOTOR, {cloth:.2} times on CLOTH)."
+        ),
+        measured: format!(
+            "RMSE of `lk` at {FEW} samples ÷ that of `enderton` at {MANY}: {}; ÷ that of `naive` at \
+             {MANY}: {}.",
+            to_enderton.range(),
+            to_naive.range()
+        ),
+        agreement: Agreement::of(&statements),
+        remark: format!(
+            "As close as in the paper's table against `enderton` {}, against `naive`, which does \
+             not stratify, {}.",
+            holds[0].words(),
+            holds[1].words()
+        ),
+    }
+}
+
+/// The section.
+pub(super) fn fewer_samples_text(text: &mut String, p: &Publications) {
+    fewer_samples(p).open(text);
+    let _ = writeln!(
+        text,
+        "RMSE as in the table above, {} × {} pixels, {} seeds.\n",
+        p.effort.side, p.effort.side, p.effort.seeds
+    );
+    let row = |table: &Table1| {
+        let lk = runs(table, FEW)[0].rmse_fine;
+        let [_, e, naive] = runs(table, MANY).map(|r| r.rmse_fine);
+        vec![
+            table.name.to_string(),
+            plain(lk),
+            plain(e),
+            plain(naive),
+            ratio(lk, e),
+            ratio(lk, naive),
+        ]
+    };
+    let rows: Vec<Vec<String>> = p.table_1.iter().map(row).collect();
+    let named = |design: &str, n: u32| format!("`{design}`, {n}");
+    let header = [
+        "scene".to_string(),
+        named("lk", FEW),
+        named("enderton", MANY),
+        named("naive", MANY),
+        "lk ÷ enderton".to_string(),
+        "lk ÷ naive".to_string(),
+    ];
+    let header: Vec<&str> = header.iter().map(String::as_str).collect();
+    text.push_str(&markdown_table(&header, &rows));
+    text.push('\n');
+}
+
+/// The table's section, without the account of where it differs.
+pub(super) fn text(text: &mut String, p: &Publications) {
+    against(p).open(text);
+    let _ = writeln!(
+        text,
+        "RMSE over the covered pixels against the exact picture of all 64 samples, so that \
+         missing antialiasing counts as it does against the paper's reference of thousands of \
+         samples; {} × {} pixels, {} seeds. `naive` is `enderton:mask=naive`, which tests every \
+         sample on its own. The paper's models are not public: ours stand in for them.\n",
+        p.effort.side, p.effort.side, p.effort.seeds
+    );
+    for (i, table) in p.table_1.iter().enumerate() {
+        table_1(text, i, table);
+    }
+    for missing in &p.missing {
+        let _ = writeln!(text, "`{missing}`: the model was not given, so there is no table.\n");
+    }
+}
+
+fn table_1(text: &mut String, index: usize, table: &Table1) {
+    let s = &table.statistics;
+    let paper = match table.stands_for {
+        Published::Motor => "MOTOR",
+        Published::Cloth => "CLOTH",
+    };
+    let _ = writeln!(
+        text,
+        "### `{}`, beside {paper}\n\n{}. {:.2} million fragments, {:.1} per covered pixel (95 % of them have \
+         at most {}), an edge in {:.0} % of the covered pixels.\n",
+        table.name,
+        table.origin,
+        s.fragments as f64 / 1e6,
+        s.depth_complexity.mean,
+        s.depth_complexity.p95,
+        100.0 * (1.0 - s.interior_pixels as f64 / s.covered_pixels.max(1) as f64),
+    );
+    let rows: Vec<Vec<String>> = COUNTS
+        .iter()
+        .zip(table.stands_for.rmse())
+        .map(|(n, [paper_lk, paper_e])| {
+            let [lk, e, naive] = runs(table, *n).map(|r| r.rmse_fine);
+            vec![
+                n.to_string(),
+                plain(lk),
+                plain(e),
+                plain(naive),
+                ratio(lk, e),
+                ratio(lk, naive),
+                format!("{paper_lk}"),
+                format!("{paper_e}"),
+                format!("{:.2}", paper_lk / paper_e),
+            ]
+        })
+        .collect();
+    let header = [
+        "samples",
+        "lk",
+        "enderton",
+        "naive",
+        "lk ÷ enderton",
+        "lk ÷ naive",
+        "paper LK",
+        "paper comp.",
+        "paper ratio",
+    ];
+    text.push_str(&markdown_table(&header, &rows));
+
+    let _ = writeln!(
+        text,
+        "\nThe same against the exact picture of the same samples (noise alone), with and without \
+         the pixels that an edge crosses:\n"
+    );
+    let rows: Vec<Vec<String>> = COUNTS
+        .iter()
+        .map(|n| {
+            let [lk, e, naive] = runs(table, *n);
+            let mut row = vec![n.to_string(), plain(lk.covered.rmse), plain(e.covered.rmse)];
+            row.push(plain_srgb(lk));
+            row.push(plain_srgb(e));
+            let regions =
+                [(&lk.covered, &e.covered), (&lk.interior, &e.interior), (&lk.edges, &e.edges)];
+            row.extend(regions.map(|(lk, e)| {
+                if lk.pixels < LEAST_PIXELS {
+                    format!("— ({} pixels)", lk.pixels)
+                } else {
+                    ratio(lk.rmse, e.rmse)
+                }
+            }));
+            row.push(ratio(lk.edges.rmse, naive.edges.rmse));
+            row
+        })
+        .collect();
+    let header = [
+        "samples",
+        "lk",
+        "enderton",
+        "lk, sRGB",
+        "enderton, sRGB",
+        "lk ÷ enderton",
+        "… without edges",
+        "… edges alone",
+        "lk ÷ naive, edges",
+    ];
+    text.push_str(&markdown_table(&header, &rows));
+    if index == 0 {
+        let _ = writeln!(
+            text,
+            "\n(RMSE on sRGB-encoded values are those of the numbers that an 8-bit display is sent.)"
+        );
+    }
+    text.push('\n');
+}
+
+/// Regions with fewer pixels say nothing.
+const LEAST_PIXELS: u64 = 1000;
+
+/// The runs of [`DESIGNS`] at a sample count.
+pub(super) fn runs(table: &Table1, samples: u32) -> [&Run; 3] {
+    DESIGNS.map(|design| {
+        let found = table.runs.iter().find(|r| r.design == design && r.samples == samples);
+        found.expect("every design was run at every count")
+    })
+}
+
+fn plain_srgb(r: &Run) -> String {
+    format!("{:.2}", r.covered.rmse_srgb.value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn known(value: f64) -> Estimate {
+        Estimate { value, low: value - 0.01, high: value + 0.01 }
+    }
+
+    #[test]
+    fn few_samples_are_close_to_many_as_far_as_the_paper_prints() {
+        let [motor, cloth] = printed_few_to_many();
+        assert!((motor - 10.3 / 8.7).abs() < 1e-12 && (cloth - 5.6 / 4.1).abs() < 1e-12);
+        assert!(close(known(6.5 / 6.3)) && close(known(cloth)));
+        assert!(!close(known(6.5 / 3.0)) && !close(known(cloth + 0.02)));
+    }
+}

@@ -1,0 +1,155 @@
+//! A design with its types hidden, so that the replay around it is compiled once
+//! rather than for each design and sample count.
+
+use std::any::Any;
+
+use screendoor_trace::picture::TilePixels;
+use crate::contract::contents::Contents;
+use crate::contract::design::Design;
+use crate::contract::event::{Event, EventCounts, Listen, NoProbe, Probe, Record};
+use crate::contract::frame::Site;
+use crate::contract::layout::{Layout, StateBits};
+use screendoor_trace::tile::{TILE_PIXELS, TileGrid, TileId};
+use screendoor_trace::trace::Block;
+
+/// The pixels of a tile as their design holds them.
+pub type TileState = Box<dyn Any + Send>;
+
+/// A design, tile by tile: a few dynamic calls for many fragments, none for each.
+pub trait Engine: Send + Sync {
+    /// As [`Design::passes`].
+    fn passes(&self) -> u32;
+    /// As [`Design::layout`].
+    fn layout(&self) -> Layout;
+    /// Its bits.
+    fn state_bits(&self) -> StateBits {
+        self.layout().bits()
+    }
+    /// As [`Design::bytes_per_fragment`].
+    fn bytes_per_fragment(&self) -> Option<usize>;
+    /// A cleared tile.
+    fn clear(&self, grid: TileGrid, tile: TileId) -> TileState;
+    /// Draws fragments of one tile, in this order; rows that cover nothing are none.
+    fn draw(&self, pass: u32, state: &mut TileState, fragments: &Block, told: Told<'_>);
+    /// Ends a pass for a tile.
+    fn end_pass(
+        &self,
+        pass: u32,
+        grid: TileGrid,
+        tile: TileId,
+        state: &mut TileState,
+        told: Told<'_>,
+    );
+    /// The colours of a tile.
+    fn resolve(&self, grid: TileGrid, tile: TileId, state: &TileState) -> TilePixels;
+    /// What a tile's pixel holds; `within` is its place in the tile.
+    fn contents(&self, state: &TileState, within: usize) -> Contents;
+}
+
+/// Who is told what happens.
+#[derive(Debug)]
+pub enum Told<'a> {
+    /// Nobody.
+    Nobody,
+    /// A tally.
+    Counts(&'a mut EventCounts),
+    /// A report of one fragment.
+    Record(&'a mut Record),
+}
+
+impl<D: Design> Engine for D {
+    fn passes(&self) -> u32 {
+        Design::passes(self)
+    }
+
+    fn layout(&self) -> Layout {
+        Design::layout(self)
+    }
+
+    fn bytes_per_fragment(&self) -> Option<usize> {
+        Design::bytes_per_fragment(self)
+    }
+
+    fn clear(&self, grid: TileGrid, tile: TileId) -> TileState {
+        let pixels: Vec<D::Pixel> =
+            sites(grid, tile).map(|site| Design::clear(self, site)).collect();
+        Box::new(pixels)
+    }
+
+    fn draw(&self, pass: u32, state: &mut TileState, fragments: &Block, told: Told<'_>) {
+        let pixels = state.downcast_mut::<Vec<D::Pixel>>().expect("the state is the design's own");
+        match told {
+            Told::Nobody => draw_all(self, pass, pixels, fragments, &mut NoProbe),
+            Told::Counts(_) | Told::Record(_) => {
+                draw_all(self, pass, pixels, fragments, &mut Listener(told));
+            }
+        }
+    }
+
+    fn end_pass(
+        &self,
+        pass: u32,
+        grid: TileGrid,
+        tile: TileId,
+        state: &mut TileState,
+        told: Told<'_>,
+    ) {
+        let pixels = state.downcast_mut::<Vec<D::Pixel>>().expect("the state is the design's own");
+        let mut listener = Listener(told);
+        for (site, pixel) in sites(grid, tile).zip(pixels) {
+            Design::end_pass(self, pass, site, pixel, &mut listener);
+        }
+    }
+
+    fn resolve(&self, grid: TileGrid, tile: TileId, state: &TileState) -> TilePixels {
+        let pixels = state.downcast_ref::<Vec<D::Pixel>>().expect("the state is the design's own");
+        let mut result = Box::new([[0.0; 3]; TILE_PIXELS]);
+        for ((site, pixel), out) in sites(grid, tile).zip(pixels).zip(result.iter_mut()) {
+            *out = Design::resolve(self, site, pixel);
+        }
+        result
+    }
+
+    fn contents(&self, state: &TileState, within: usize) -> Contents {
+        let pixels = state.downcast_ref::<Vec<D::Pixel>>().expect("the state is the design's own");
+        Design::contents(self, &pixels[within])
+    }
+}
+
+fn draw_all<D: Design, P: Probe>(
+    design: &D,
+    pass: u32,
+    pixels: &mut [D::Pixel],
+    fragments: &Block,
+    probe: &mut P,
+) {
+    for fragment in fragments.iter() {
+        let site = Site { x: fragment.x, y: fragment.y };
+        let pixel = &mut pixels[TileGrid::within(site.x, site.y)];
+        probe.fragment(fragment.coverage);
+        design.draw(pass, site, pixel, &fragment, probe);
+    }
+}
+
+/// The sites of a tile's pixels, including those beyond the frame's edge.
+pub(crate) fn sites(grid: TileGrid, tile: TileId) -> impl Iterator<Item = Site> {
+    (0..TILE_PIXELS).map(move |within| {
+        let (x, y) = grid.pixel(tile, within);
+        // Beyond a frame of full size this wraps; such pixels are never drawn to.
+        Site { x: x as u16, y: y as u16 }
+    })
+}
+
+/// One probe for all who listen: designs are compiled for it and for nobody.
+pub(crate) struct Listener<'a>(pub Told<'a>);
+
+impl Listen for Listener<'_> {
+    #[inline(never)]
+    fn event(&mut self, event: Event<'_>) {
+        match &mut self.0 {
+            Told::Nobody => {}
+            Told::Counts(counts) => counts.event(event),
+            Told::Record(record) => record.event(event),
+        }
+    }
+}

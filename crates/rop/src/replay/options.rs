@@ -1,0 +1,72 @@
+//! How to replay a trace.
+
+use fearless_simd::Level;
+
+use screendoor_trace::error::{Error, Result};
+use screendoor_trace::param::Options;
+use crate::lanes::levels;
+
+screendoor_trace::options! {
+    /// Which of a design's implementations draws; they give the same bits.
+    pub enum Which {
+        Fast = "fast": "the design's fast engine, where it has one, with what the machine has",
+        Avx512 = "avx512": "the same with AVX-512 (x86)",
+        Avx2 = "avx2": "the same with AVX2 (x86)",
+        Neon = "neon": "the same with NEON (ARM)",
+        Portable = "portable": "the same without vector instructions of its own",
+        Reference = "reference": "the plain text that says what the design is",
+    }
+}
+
+impl Which {
+    /// The instruction set of a fast engine; `None` for the reference.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] where this machine lacks it.
+    pub fn level(self) -> Result<Option<Level>> {
+        let name = match self {
+            // Without vector instructions the plain text is the faster one.
+            Which::Fast => {
+                let best = levels().into_iter().find(|(_, level)| !level.is_fallback());
+                return Ok(best.map(|(_, level)| level));
+            }
+            Which::Reference => return Ok(None),
+            _ => Self::CHOICES[self as usize].name,
+        };
+        match levels().into_iter().find(|(level, _)| *level == name) {
+            Some((_, level)) => Ok(Some(level)),
+            None => Err(Error::unsupported(
+                format_args!("the engine '{name}'"),
+                "this machine does not have these instructions",
+                "choose 'fast', which takes what the machine has",
+            )),
+        }
+    }
+}
+
+/// How to replay a trace; none of it changes the picture.
+#[derive(Clone, Copy)]
+pub struct ReplayOptions<'a> {
+    /// Which implementation draws.
+    pub engine: Which,
+    /// Whether to count events.
+    pub count_events: bool,
+    /// Fragments that are binned at a time, at most.
+    pub window: usize,
+    /// Bytes that the state of a design may take that grows with the fragments.
+    pub memory: u64,
+    /// Is told how many fragments have been drawn, of how many.
+    pub progress: &'a (dyn Fn(u64, u64) + Sync),
+}
+
+impl Default for ReplayOptions<'_> {
+    fn default() -> Self {
+        ReplayOptions {
+            engine: Which::Fast,
+            count_events: false,
+            window: 1 << 19,
+            memory: 1 << 29,
+            progress: &|_, _| (),
+        }
+    }
+}

@@ -1,0 +1,253 @@
+//! From the scene's space to the frame.
+
+use glam::{DMat4, DVec3, DVec4};
+
+use screendoor_trace::error::{Error, Result};
+use crate::scene::Scene;
+
+/// From where and how wide to look. What is not given follows the scene's own
+/// view, framed so that all of it shows.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CameraOptions {
+    /// Degrees to the right of the scene's front (+z), and above the horizontal.
+    pub angle: Option<[f64; 2]>,
+    /// Distance from the scene's centre, in units of the radius of the sphere
+    /// that holds it.
+    pub distance: Option<f64>,
+    /// Vertical field of view in degrees; 0 looks along parallel lines.
+    pub field_of_view: Option<f64>,
+}
+
+/// Degrees from top to bottom where nothing else is asked for.
+const FIELD_OF_VIEW: f64 = 35.0;
+/// The share of the frame left free around a framed scene, on each side.
+const MARGIN: f64 = 0.03;
+/// The near plane is at least this share of the far plane's distance.
+const NEAREST: f64 = 1e-3;
+
+/// A camera over a frame.
+#[derive(Clone, Debug)]
+pub struct Camera {
+    /// From the scene's space to clip space: depth 0 at the near plane.
+    pub(crate) to_clip: DMat4,
+    /// Unit vectors of the view, in the scene's space.
+    pub(crate) right: DVec3,
+    pub(crate) up: DVec3,
+    /// From the scene's centre towards the camera.
+    pub(crate) back: DVec3,
+    /// Where the camera stands; `None` looks along parallel lines.
+    pub(crate) eye: Option<DVec3>,
+    /// Frame size in pixels.
+    pub(crate) size: [f64; 2],
+    description: String,
+}
+
+impl Camera {
+    /// The camera that `options` and the scene's view describe, over a frame of
+    /// `width` × `height` pixels.
+    ///
+    /// # Errors
+    /// [`Error::Config`] for options out of range.
+    pub fn frame(scene: &Scene, options: &CameraOptions, width: u32, height: u32) -> Result<Self> {
+        let view = scene.view;
+        let [yaw, pitch] = options.angle.unwrap_or([view.yaw, view.pitch]);
+        if !(yaw.is_finite() && (-90.0..=90.0).contains(&pitch)) {
+            return Err(Error::config(
+                format_args!("the camera cannot stand at {yaw},{pitch} degrees"),
+                "give degrees to the right, and -90 to 90 degrees above",
+            ));
+        }
+        let default = if view.orthographic { 0.0 } else { FIELD_OF_VIEW };
+        let fov = options.field_of_view.unwrap_or(default);
+        if !(fov == 0.0 || (1.0..=150.0).contains(&fov)) {
+            return Err(Error::config(
+                format_args!("a field of view of {fov} degrees cannot be"),
+                "give 1 to 150 degrees, or 0 for parallel lines",
+            ));
+        }
+        if options.distance.is_some_and(|d| !(d > 0.0 && d < 1e6)) {
+            return Err(Error::config(
+                "the camera's distance is out of range",
+                "give it in units of the scene's radius, above 0",
+            ));
+        }
+
+        let (sin_yaw, cos_yaw) = libm::sincos(yaw.to_radians());
+        let (sin_pitch, cos_pitch) = libm::sincos(pitch.to_radians());
+        let back = DVec3::new(sin_yaw * cos_pitch, sin_pitch, cos_yaw * cos_pitch);
+        let right = DVec3::new(cos_yaw, 0.0, -sin_yaw);
+        let up = back.cross(right);
+
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for (point, radius) in scene.bounding_points() {
+            low = low.min(point - radius);
+            high = high.max(point + radius);
+        }
+        let centre = (low + high) * 0.5;
+        let mut radius = 0.0_f64;
+        for (point, around) in scene.bounding_points() {
+            radius = radius.max((point - centre).length() + around);
+        }
+        let radius = if radius > 0.0 { radius } else { 1.0 };
+        let in_view = |point: DVec3| {
+            let p = point - centre;
+            DVec3::new(right.dot(p), up.dot(p), back.dot(p))
+        };
+        // Scene space to view space: the camera looks along −z from `centre`.
+        let to_view = DMat4::from_cols(
+            DVec4::new(right.x, up.x, back.x, 0.0),
+            DVec4::new(right.y, up.y, back.y, 0.0),
+            DVec4::new(right.z, up.z, back.z, 0.0),
+            DVec4::new(-right.dot(centre), -up.dot(centre), -back.dot(centre), 1.0),
+        );
+
+        let aspect = f64::from(width) / f64::from(height);
+        let room = 1.0 - 2.0 * MARGIN;
+        let (mut nearest, mut furthest) = (f64::NEG_INFINITY, f64::INFINITY);
+        for (point, around) in scene.bounding_points() {
+            let z = in_view(point).z;
+            nearest = nearest.max(z + around);
+            furthest = furthest.min(z - around);
+        }
+        // Something flat still needs a depth range.
+        let slack = (1e-3 * radius).max(f64::MIN_POSITIVE);
+        let (nearest, furthest) = (nearest + slack, furthest - slack);
+
+        let (to_clip, eye) = if fov == 0.0 {
+            let [mut half_width, mut half_height] = view.frame.unwrap_or([0.0; 2]);
+            if view.frame.is_none() {
+                for (point, around) in scene.bounding_points() {
+                    let p = in_view(point);
+                    half_width = half_width.max((p.x.abs() + around) / room);
+                    half_height = half_height.max((p.y.abs() + around) / room);
+                }
+            }
+            // The frame's shape decides; what was asked for fits inside.
+            let half_height = half_height.max(half_width / aspect).max(slack);
+            let half_width = half_height * aspect;
+            let projection = DMat4::from_cols(
+                DVec4::new(1.0 / half_width, 0.0, 0.0, 0.0),
+                DVec4::new(0.0, 1.0 / half_height, 0.0, 0.0),
+                DVec4::new(0.0, 0.0, -1.0 / (nearest - furthest), 0.0),
+                DVec4::new(0.0, 0.0, nearest / (nearest - furthest), 1.0),
+            );
+            (projection * to_view, None)
+        } else {
+            let tangent_y = libm::tan(fov.to_radians() / 2.0);
+            let tangent_x = tangent_y * aspect;
+            let distance = match options.distance {
+                Some(units) => units * radius,
+                None => {
+                    let mut distance = 0.0_f64;
+                    for (point, around) in scene.bounding_points() {
+                        let p = in_view(point);
+                        let fit = |offset: f64, tangent: f64| {
+                            let tangent = tangent * room;
+                            // A sphere's silhouette lies outside its centre's ray.
+                            let outward = around * (1.0 + tangent * tangent).sqrt();
+                            (offset.abs() + outward) / tangent + p.z
+                        };
+                        distance = distance.max(fit(p.x, tangent_x)).max(fit(p.y, tangent_y));
+                    }
+                    distance.max(nearest + slack)
+                }
+            };
+            let far = distance - furthest;
+            if far <= 0.0 {
+                return Err(Error::config(
+                    "the whole scene lies behind the camera",
+                    "move it away with --distance",
+                ));
+            }
+            let near = (distance - nearest).max(far * NEAREST);
+            let projection = DMat4::from_cols(
+                DVec4::new(1.0 / tangent_x, 0.0, 0.0, 0.0),
+                DVec4::new(0.0, 1.0 / tangent_y, 0.0, 0.0),
+                DVec4::new(0.0, 0.0, -far / (far - near), -1.0),
+                DVec4::new(0.0, 0.0, -far * near / (far - near), 0.0),
+            );
+            let retreat = DMat4::from_translation(DVec3::new(0.0, 0.0, -distance));
+            (projection * retreat * to_view, Some(centre + back * distance))
+        };
+        let lens = match (fov, options.distance) {
+            (0.0, _) => "parallel lines".to_string(),
+            (fov, Some(d)) => format!("field of view {fov}, distance {d} radii"),
+            (fov, None) => format!("field of view {fov}, framed"),
+        };
+        Ok(Camera {
+            to_clip,
+            right,
+            up,
+            back,
+            eye,
+            size: [f64::from(width), f64::from(height)],
+            description: format!("angle {yaw},{pitch}, {lens}"),
+        })
+    }
+
+    /// The camera in words, for a trace's header.
+    pub fn description(&self) -> &str {
+        &self.description
+    }
+
+    /// Unit vector from `point` towards the camera.
+    pub(crate) fn towards(&self, point: DVec3) -> DVec3 {
+        self.eye.map_or(self.back, |eye| (eye - point).normalize_or(self.back))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Mesh, Shape};
+    use glam::Vec3;
+
+    fn cube() -> Scene {
+        let corner = |i: u32| Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32);
+        let mesh = Mesh {
+            positions: (0..8).map(corner).collect(),
+            triangles: (0..6).map(|i| [i, i + 1, i + 2]).collect(),
+            ..Mesh::default()
+        };
+        let mut scene = Scene::default();
+        scene.add("cube", Shape::Mesh(mesh));
+        scene
+    }
+
+    #[test]
+    fn a_framed_scene_lies_in_the_frame_and_touches_its_margin() {
+        for fov in [0.0, 10.0, 60.0, 120.0] {
+            for angle in [[0.0, 0.0], [30.0, 20.0], [200.0, -90.0]] {
+                for (width, height) in [(100, 100), (320, 100), (50, 200)] {
+                    let options = CameraOptions {
+                        angle: Some(angle),
+                        field_of_view: Some(fov),
+                        distance: None,
+                    };
+                    let scene = cube();
+                    let camera = Camera::frame(&scene, &options, width, height).unwrap();
+                    let mut reach = 0.0_f64;
+                    for (point, _) in scene.bounding_points() {
+                        let clip = camera.to_clip * point.extend(1.0);
+                        let ndc = clip.truncate() / clip.w;
+                        assert!((0.0..=1.0).contains(&ndc.z), "{fov} {angle:?} {ndc}");
+                        reach = reach.max(ndc.x.abs()).max(ndc.y.abs());
+                    }
+                    assert!((reach - (1.0 - 2.0 * MARGIN)).abs() < 1e-9, "{fov} {angle:?} {reach}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn yaw_turns_right_and_pitch_lifts() {
+        let at = |yaw, pitch| {
+            let angle = Some([yaw, pitch]);
+            let options = CameraOptions { angle, ..CameraOptions::default() };
+            Camera::frame(&cube(), &options, 10, 10).unwrap().back
+        };
+        assert!((at(90.0, 0.0) - DVec3::X).length() < 1e-12);
+        assert!((at(0.0, 90.0) - DVec3::Y).length() < 1e-12);
+        assert!((at(0.0, 0.0) - DVec3::Z).length() < 1e-12);
+    }
+}

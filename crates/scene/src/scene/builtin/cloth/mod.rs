@@ -1,0 +1,75 @@
+//! Printed sheets draped one over another.
+
+mod drape;
+mod fabric;
+
+use glam::{Affine2, Vec2, Vec3};
+use rayon::prelude::*;
+
+use screendoor_trace::param::{Param, Values};
+use crate::scene::builtin::{Builtin, SEED, seed};
+use crate::scene::{Material, Mesh, Scene, Shape, TextureUse, View};
+
+pub(super) const SCENE: Builtin = Builtin {
+    name: "cloth",
+    summary: "draped sheets with printed and woven patterns, alpha 0.4",
+    params: &[
+        Param::integer("sheets", "5", (1, 8), "how many sheets"),
+        Param::integer("cells", "72", (8, 96), "cells along a sheet's side"),
+        SEED,
+    ],
+    build,
+};
+
+fn build(values: &Values) -> Scene {
+    let mut scene = Scene {
+        view: View { yaw: 30.0, pitch: 24.0, background: [0.06, 0.065, 0.075], ..View::default() },
+        ..Scene::default()
+    };
+    let cells = values.integer("cells") as usize / 2 * 2;
+    let sheets = values.integer("sheets") as u32;
+    let draped: Vec<drape::Sheet> =
+        (0..sheets).into_par_iter().map(|i| drape::drape(i, sheets, cells, seed(values))).collect();
+    for (i, sheet) in draped.iter().enumerate() {
+        let (texture, repeats) = fabric::fabric(i);
+        scene.textures.push(texture);
+        scene.materials.push(Material {
+            base_texture: Some(TextureUse {
+                transform: Affine2::from_scale(Vec2::splat(repeats)),
+                ..TextureUse::plain(i)
+            }),
+            ..Material::diffuse("fabric", [1.0; 3], 0.4)
+        });
+        scene.add(format!("sheet {}", i + 1), Shape::Mesh(mesh(sheet, i)));
+    }
+    scene
+}
+
+/// A sheet's mesh, smooth, with its sides running over the texture once.
+fn mesh(sheet: &drape::Sheet, material: usize) -> Mesh {
+    let n = sheet.cells;
+    let mut mesh = Mesh { material, positions: sheet.points.clone(), ..Mesh::default() };
+    for j in 0..=n {
+        for i in 0..=n {
+            mesh.uvs.push(Vec2::new(i as f32, j as f32) / n as f32);
+            mesh.normals.push(normal(sheet, i, j));
+            if i < n && j < n {
+                let at = |i: usize, j: usize| sheet.at(i, j) as u32;
+                let [a, b, c, d] = [at(i, j), at(i, j + 1), at(i + 1, j + 1), at(i + 1, j)];
+                // The diagonals alternate so that folds have no preferred side.
+                let pair =
+                    if (i + j) % 2 == 0 { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] };
+                mesh.triangles.extend(pair);
+            }
+        }
+    }
+    mesh
+}
+
+fn normal(sheet: &drape::Sheet, i: usize, j: usize) -> Vec3 {
+    let n = sheet.cells;
+    let point = |i: usize, j: usize| sheet.points[sheet.at(i, j)];
+    let along = point((i + 1).min(n), j) - point(i.saturating_sub(1), j);
+    let across = point(i, (j + 1).min(n)) - point(i, j.saturating_sub(1));
+    across.cross(along).normalize_or(Vec3::Y)
+}

@@ -1,0 +1,490 @@
+//! Scenes: triangles, strands and particles with their materials, from files
+//! and from built-in generators.
+//!
+//! A scene knows nothing of pixels. [`load`] takes either the name of a file
+//! (OBJ, glTF, GLB, OpenVDB, TressFX, compressed Gaussian splats) or `builtin:NAME`.
+
+pub mod builtin;
+mod bytes;
+mod file;
+mod folder;
+mod gltf_file;
+mod image_file;
+mod material;
+mod obj_file;
+mod polygon;
+mod sampling;
+mod source;
+mod splat_file;
+mod sprite;
+mod texture;
+mod tfx_file;
+mod vdb_file;
+
+pub use source::{ENDINGS, check, meant_builtin, path_of, seen_from};
+
+use std::path::{Path, PathBuf};
+
+use glam::{DAffine3, DVec3, Mat3, Vec2, Vec3, Vec4};
+
+pub use material::{AlphaMode, Material, TextureUse};
+pub use sampling::{Filter, Sampling, Wrap};
+pub use texture::Texture;
+
+use screendoor_trace::error::{Error, Result};
+use crate::scene::folder::Folder;
+use crate::scene::source::{BUILTIN, ending, no_builtin, no_scene};
+
+/// The most texels of all textures of a scene that were read from files: 11 bytes
+/// each when loaded.
+const MAX_TEXELS: u64 = 1 << 28;
+
+/// A scene: objects that draw shapes with materials.
+#[derive(Clone, Debug, Default)]
+pub struct Scene {
+    /// Where it comes from: a file's name, or a built-in with its parameters.
+    pub source: String,
+    /// Objects in API order.
+    pub objects: Vec<Object>,
+    /// What the objects place.
+    pub shapes: Vec<Shape>,
+    /// What the shapes are made of; never empty in a loaded scene.
+    pub materials: Vec<Material>,
+    /// What the materials show.
+    pub textures: Vec<Texture>,
+    /// From where it is best seen.
+    pub view: View,
+    /// The files that it was read from.
+    pub files: Vec<PathBuf>,
+    /// What could not be honoured, for the user to know.
+    pub warnings: Vec<String>,
+}
+
+/// A shape at its place in the scene.
+#[derive(Clone, Debug)]
+pub struct Object {
+    /// Its name, for people.
+    pub name: String,
+    /// Which of [`Scene::shapes`].
+    pub shape: usize,
+    /// From the shape's space to the scene's.
+    pub place: DAffine3,
+}
+
+/// Something to draw.
+#[derive(Clone, Debug)]
+pub enum Shape {
+    /// A triangle mesh.
+    Mesh(Mesh),
+    /// Thin ribbons that face the camera.
+    Strands(Strands),
+    /// Squares that face the camera, or the outlines of ellipsoids.
+    Particles(Particles),
+}
+
+impl Shape {
+    /// How many triangles it draws.
+    pub fn triangle_count(&self) -> usize {
+        match self {
+            Shape::Mesh(mesh) => mesh.triangles.len(),
+            Shape::Strands(strands) => strands.segment_count() * 2,
+            Shape::Particles(particles) => particles.centres.len() * 2,
+        }
+    }
+
+    /// Which of [`Scene::materials`] it is made of.
+    pub fn material(&self) -> usize {
+        match self {
+            Shape::Mesh(mesh) => mesh.material,
+            Shape::Strands(strands) => strands.material,
+            Shape::Particles(particles) => particles.material,
+        }
+    }
+
+    /// Points that bound it, each with a radius around it.
+    fn bounding_points(&self) -> Box<dyn Iterator<Item = (Vec3, f32)> + '_> {
+        match self {
+            Shape::Mesh(mesh) => Box::new(
+                mesh.triangles.iter().flatten().map(|i| (mesh.positions[*i as usize], 0.0)),
+            ),
+            Shape::Strands(s) => Box::new(s.points.iter().copied().zip(s.radii.iter().copied())),
+            Shape::Particles(p) if p.axes.is_empty() => Box::new(
+                // A square's corner is further from its centre than its side.
+                p.centres.iter().copied().zip(p.sizes.iter().map(|s| s * std::f32::consts::SQRT_2)),
+            ),
+            // The corners of the boxes around the ellipsoids.
+            Shape::Particles(p) => {
+                let corner =
+                    |i: u32| Vec3::from([0, 1, 2].map(|k| 1.0 - (i >> k & 1) as f32 * 2.0));
+                let corners = move |(centre, axes): (&Vec3, &Mat3)| {
+                    let (centre, axes) = (*centre, *axes);
+                    (0..8).map(move |i| (centre + axes * corner(i), 0.0))
+                };
+                Box::new(p.centres.iter().zip(&p.axes).flat_map(corners))
+            }
+        }
+    }
+}
+
+/// A triangle mesh. The optional attributes are empty, or one for each position.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// Vertex positions.
+    pub positions: Vec<Vec3>,
+    /// Vertex normals; a mesh without them is shaded flat.
+    pub normals: Vec<Vec3>,
+    /// Texture coordinates, (0, 0) at the texture's top left.
+    pub uvs: Vec<Vec2>,
+    /// A second set of texture coordinates.
+    pub more_uvs: Vec<Vec2>,
+    /// Linear colours and alphas, multiplied into the material's.
+    pub colours: Vec<Vec4>,
+    /// Vertex numbers, three a triangle, in API order.
+    pub triangles: Vec<[u32; 3]>,
+    /// Which of [`Scene::materials`].
+    pub material: usize,
+}
+
+/// Curves drawn as ribbons that face the camera.
+#[derive(Clone, Debug, Default)]
+pub struct Strands {
+    /// Points along all curves, curve after curve.
+    pub points: Vec<Vec3>,
+    /// Half of the ribbon's width at each point.
+    pub radii: Vec<f32>,
+    /// Linear colours, one for each curve, multiplied into the material's.
+    pub colours: Vec<Vec4>,
+    /// The first point of each curve, and at the end the number of points; each
+    /// curve has at least two.
+    pub starts: Vec<u32>,
+    /// Which of [`Scene::materials`].
+    pub material: usize,
+}
+
+impl Strands {
+    /// How many curves there are.
+    pub fn strand_count(&self) -> usize {
+        self.starts.len().saturating_sub(1)
+    }
+
+    /// How many straight pieces the curves have.
+    pub fn segment_count(&self) -> usize {
+        self.points.len() - self.strand_count()
+    }
+}
+
+/// Squares that face the camera, or the rectangles around the outlines of ellipsoids.
+#[derive(Clone, Debug, Default)]
+pub struct Particles {
+    /// Centres.
+    pub centres: Vec<Vec3>,
+    /// Half of the side; of an ellipsoid the longest semi-axis.
+    pub sizes: Vec<f32>,
+    /// Turn around the axis towards the camera, in radians; empty for none.
+    pub angles: Vec<f32>,
+    /// Empty, or each particle is an ellipsoid that has the columns for semi-axes,
+    /// and no angle.
+    pub axes: Vec<Mat3>,
+    /// Linear colours and alphas, multiplied into the material's.
+    pub colours: Vec<Vec4>,
+    /// Which of [`Scene::materials`].
+    pub material: usize,
+}
+
+/// From where a scene is best seen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// Degrees that the camera stands to the right of the scene's front (+z).
+    pub yaw: f64,
+    /// Degrees that it stands above the horizontal.
+    pub pitch: f64,
+    /// Whether parallel lines stay parallel.
+    pub orthographic: bool,
+    /// Linear colour behind the scene.
+    pub background: [f32; 3],
+    /// What the frame shows, where it is not the whole scene: the half-extents
+    /// of a centred rectangle in the plane facing the camera.
+    pub frame: Option<[f64; 2]>,
+}
+
+impl Default for View {
+    fn default() -> Self {
+        View { yaw: 30.0, pitch: 20.0, orthographic: false, background: [0.0; 3], frame: None }
+    }
+}
+
+impl View {
+    /// Straight from the front along parallel lines, onto a square from −1 to 1,
+    /// before black: for pictures rather than things.
+    pub const FRONT: View = View {
+        yaw: 0.0,
+        pitch: 0.0,
+        orthographic: true,
+        background: [0.0; 3],
+        frame: Some([1.0, 1.0]),
+    };
+}
+
+impl Scene {
+    /// How many triangles it draws.
+    pub fn triangle_count(&self) -> usize {
+        self.objects.iter().map(|o| self.shapes[o.shape].triangle_count()).sum()
+    }
+
+    /// All points that bound the scene, each with a radius around it.
+    pub fn bounding_points(&self) -> impl Iterator<Item = (DVec3, f64)> + '_ {
+        self.objects.iter().flat_map(|object| {
+            // The largest stretch of any direction bounds how a radius grows.
+            let matrix = object.place.matrix3;
+            let stretch = matrix.x_axis.length().max(matrix.y_axis.length());
+            let stretch = stretch.max(matrix.z_axis.length());
+            self.shapes[object.shape].bounding_points().map(move |(point, radius)| {
+                (object.place.transform_point3(point.as_dvec3()), f64::from(radius) * stretch)
+            })
+        })
+    }
+
+    /// Adds a shape and an object that places it as it is.
+    pub fn add(&mut self, name: impl Into<String>, shape: Shape) {
+        self.objects.push(Object {
+            name: name.into(),
+            shape: self.shapes.len(),
+            place: DAffine3::IDENTITY,
+        });
+        self.shapes.push(shape);
+    }
+
+    /// Adds a texture that was read; its number.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] where the scene's textures then had more than
+    /// [`MAX_TEXELS`] texels together.
+    fn add_texture(&mut self, texture: Texture) -> Result<usize> {
+        let size = |t: &Texture| u64::from(t.width()) * u64::from(t.height());
+        if self.textures.iter().map(size).sum::<u64>() + size(&texture) > MAX_TEXELS {
+            let what = format!("its textures have more than {MAX_TEXELS} texels together");
+            return Err(Error::unsupported(&self.source, what, "scale them down"));
+        }
+        self.textures.push(texture);
+        Ok(self.textures.len() - 1)
+    }
+
+    /// Puts the texture in the file at `path` on every material that has none;
+    /// where it has an alpha, those materials show it.
+    ///
+    /// # Errors
+    /// As [`Texture::read`], and where the scene's textures become too large
+    /// together.
+    pub fn apply_texture(&mut self, path: &Path) -> Result<()> {
+        let texture = Texture::read(path)?;
+        self.files.push(path.to_path_buf());
+        let has_alpha = texture.has_alpha();
+        let texture = self.add_texture(texture)?;
+        for material in self.materials.iter_mut().filter(|m| m.base_texture.is_none()) {
+            material.base_texture = Some(TextureUse::plain(texture));
+            if has_alpha && material.alpha_mode == AlphaMode::Opaque {
+                material.alpha_mode = AlphaMode::Blend;
+            }
+        }
+        Ok(())
+    }
+
+    /// Makes every surface white, keeping alphas: the untextured models of the
+    /// publications.
+    pub fn whiten(&mut self) {
+        for material in &mut self.materials {
+            material.base = Vec3::ONE.extend(material.base.w);
+            material.emissive = Vec3::ZERO;
+        }
+        let materials = self.materials.iter();
+        let data: Vec<usize> = materials
+            .flat_map(|m| [m.alpha_texture, m.transmission_texture])
+            .flatten()
+            .map(|used| used.texture)
+            .collect();
+        for (i, texture) in self.textures.iter_mut().enumerate() {
+            // What is no colour stays what it is.
+            if !data.contains(&i) {
+                texture.whiten();
+            }
+        }
+        for shape in &mut self.shapes {
+            let colours = match shape {
+                Shape::Mesh(mesh) => &mut mesh.colours,
+                Shape::Strands(strands) => &mut strands.colours,
+                Shape::Particles(particles) => &mut particles.colours,
+            };
+            colours.iter_mut().for_each(|c| *c = Vec3::ONE.extend(c.w));
+        }
+    }
+
+    /// Checks that the scene can be drawn: indices in range, numbers finite,
+    /// something there at all.
+    fn check(&mut self) -> Result<()> {
+        let source = &self.source;
+        for object in &self.objects {
+            let place = format!("{source}, object '{}'", object.name);
+            if !object.place.is_finite() {
+                let hint = "correct its transformation";
+                return Err(Error::invalid(place, "it stands at no finite place", hint));
+            }
+            match &self.shapes[object.shape] {
+                Shape::Mesh(mesh) => check_mesh(mesh, &place)?,
+                Shape::Strands(s) => check_points(&s.points, &place)?,
+                Shape::Particles(p) => check_points(&p.centres, &place)?,
+            }
+        }
+        if self.triangle_count() == 0 {
+            let hint = "give a scene with at least one triangle";
+            // What was left out may be all there is.
+            let what = match &self.warnings[..] {
+                [] => "the scene has no triangles".to_string(),
+                all => {
+                    let few = all[..all.len().min(3)].join("; ");
+                    format!("the scene has no triangles ({few})")
+                }
+            };
+            return Err(Error::invalid(source, what, hint));
+        }
+        let flat = self.flat_triangles();
+        if flat == self.triangle_count() {
+            let what = format_args!("all of its {flat} triangles have no area").to_string();
+            return Err(Error::invalid(source, what, "give a scene with something to see"));
+        }
+        if u32::try_from(self.triangle_count()).is_err() {
+            let hint = "split the scene";
+            return Err(Error::unsupported(source, "it has more than 2^32 triangles", hint));
+        }
+        if flat > 0 {
+            let warning = format!("{source}: {flat} triangles have no area and draw nothing");
+            self.warnings.push(warning);
+        }
+        Ok(())
+    }
+
+    /// How many triangles of meshes have no area.
+    fn flat_triangles(&self) -> usize {
+        let of_shape = |shape: &Shape| match shape {
+            Shape::Mesh(mesh) => mesh
+                .triangles
+                .iter()
+                .filter(|t| {
+                    let [a, b, c] = t.map(|i| mesh.positions[i as usize].as_dvec3());
+                    (b - a).cross(c - a) == DVec3::ZERO
+                })
+                .count(),
+            Shape::Strands(_) | Shape::Particles(_) => 0,
+        };
+        let by_shape: Vec<usize> = self.shapes.iter().map(of_shape).collect();
+        self.objects.iter().map(|o| by_shape[o.shape]).sum()
+    }
+}
+
+fn check_points(points: &[Vec3], place: &str) -> Result<()> {
+    match points.iter().position(|p| !p.is_finite()) {
+        None => Ok(()),
+        Some(i) => Err(Error::invalid(
+            place,
+            format_args!("vertex {i} is {}, which is no finite place", points[i]),
+            "correct the vertex",
+        )),
+    }
+}
+
+fn check_mesh(mesh: &Mesh, place: &str) -> Result<()> {
+    check_points(&mesh.positions, place)?;
+    let count = mesh.positions.len();
+    let bad = mesh.triangles.iter().position(|t| t.iter().any(|i| *i as usize >= count));
+    if let Some(triangle) = bad {
+        return Err(Error::invalid(
+            place,
+            format_args!(
+                "triangle {triangle} names vertices {:?} of only {count}",
+                mesh.triangles[triangle]
+            ),
+            "correct the indices",
+        ));
+    }
+    for (name, length) in [
+        ("normals", mesh.normals.len()),
+        ("texture coordinates", mesh.uvs.len()),
+        ("second texture coordinates", mesh.more_uvs.len()),
+        ("colours", mesh.colours.len()),
+    ] {
+        if length != 0 && length != count {
+            return Err(Error::invalid(
+                place,
+                format_args!("it has {count} vertices and {length} {name}"),
+                "give one for each vertex, or none",
+            ));
+        }
+    }
+    let finite = mesh.uvs.iter().chain(&mesh.more_uvs).all(|v| v.is_finite())
+        && mesh.normals.iter().all(|v| v.is_finite())
+        && mesh.colours.iter().all(|v| v.is_finite());
+    if !finite {
+        let what = "a normal, texture coordinate or colour is not finite";
+        return Err(Error::invalid(place, what, "correct the vertex"));
+    }
+    Ok(())
+}
+
+/// How a scene is loaded.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct LoadOptions {
+    /// Which grid of a volume to draw; where none is named, its densities.
+    pub grid: Option<String>,
+    /// Whether a scene's file may name files outside its own folder.
+    pub allow_outside: bool,
+}
+
+/// Loads the scene that `source` names, as [`load_with`] does without options.
+///
+/// # Errors
+/// As [`load_with`].
+pub fn load(source: &str) -> Result<Scene> {
+    load_with(source, &LoadOptions::default())
+}
+
+/// Loads the scene that `source` names: `builtin:NAME[:key=value,…]`, or a file
+/// whose ending says its format. Nothing outside the file's folder is opened.
+///
+/// # Errors
+/// [`Error::Config`] for an unknown built-in or ending, or a grid that is not there,
+/// [`Error::Io`] where the file cannot be read, [`Error::Invalid`] where it is damaged or
+/// holds nothing to draw.
+pub fn load_with(source: &str, options: &LoadOptions) -> Result<Scene> {
+    let kind = path_of(source).map(ending);
+    if options.grid.is_some() && kind.as_deref() != Some("vdb") {
+        let what = format_args!("'{source}' has no grids to choose from");
+        return Err(Error::config(what, "leave --grid out, or give a .vdb file"));
+    }
+    let mut scene = match source.strip_prefix(BUILTIN) {
+        Some(spec) => builtin::build(spec).map_err(|e| no_builtin(source, e))?,
+        None => {
+            let path = Path::new(source);
+            let folder = Folder::of(path, options.allow_outside);
+            let mut scene = match ending(path).as_str() {
+                "obj" => obj_file::load(path, &folder)?,
+                "gltf" | "glb" => gltf_file::load(path, &folder)?,
+                "vdb" => vdb_file::load(path, options.grid.as_deref())?,
+                "ply" => splat_file::load(path)?,
+                "tfx" => tfx_file::load(path)?,
+                _ => return Err(no_scene(source)),
+            };
+            folder.tell(&mut scene);
+            scene
+        }
+    };
+    if scene.materials.is_empty() {
+        scene.materials.push(Material::default());
+    }
+    scene.check()?;
+    Ok(scene)
+}
+
+/// The name under which a file appears in traces: without its folders, so that a
+/// trace does not depend on where its scene lay.
+fn file_name(path: &Path) -> String {
+    path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+}

@@ -1,0 +1,169 @@
+//! Meshes of what an OBJ file defines.
+
+use std::collections::HashMap;
+
+use glam::{DVec3, Vec2, Vec3, Vec4};
+
+use super::geometry::{Face, Geometry, Segment};
+use screendoor_trace::error::{Error, Result};
+use screendoor_trace::picture::srgb;
+use crate::scene::Mesh;
+use crate::scene::polygon::{Corner, Cutter};
+
+/// A scene further from the origin than this many times its size is moved there before its
+/// places are rounded to single precision.
+const FAR: f64 = 16.0;
+
+/// Makes meshes of a file's faces.
+pub(super) struct Builder<'a> {
+    place: &'a str,
+    geometry: &'a Geometry,
+    /// Linear.
+    colours: Vec<Vec4>,
+    /// What is subtracted from all places.
+    pub origin: DVec3,
+    /// Faces of smoothing groups that have no normals.
+    pub flat: usize,
+    cutter: Cutter,
+}
+
+impl<'a> Builder<'a> {
+    /// One for the file called `place`.
+    pub fn new(place: &'a str, geometry: &'a Geometry) -> Self {
+        let linear = |c: f32| srgb::decode(f64::from(c.clamp(0.0, 1.0))) as f32;
+        let colour = |c: &Vec4| c.truncate().map(linear).extend(c.w.clamp(0.0, 1.0));
+        Builder {
+            place,
+            geometry,
+            colours: geometry.colours.iter().map(colour).collect(),
+            origin: origin(geometry),
+            flat: 0,
+            cutter: Cutter::default(),
+        }
+    }
+
+    /// The mesh of the faces of the segment up to `end`.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] for a polygon that is too complex.
+    pub fn mesh(&mut self, segment: &Segment, end: usize) -> Result<Mesh> {
+        let mut mesh = Mesh::default();
+        let mut known = HashMap::new();
+        let faces = &self.geometry.faces;
+        let mut start = segment.first.checked_sub(1).map_or(0, |before| faces[before].end);
+        let mut points = Vec::new();
+        for face in &faces[segment.first..end] {
+            let corners = &self.geometry.corners[start..face.end];
+            start = face.end;
+            self.flat += usize::from(face.smooth && corners.iter().any(|c| c[2] == 0));
+            points.clear();
+            points.extend(corners.iter().map(|c| self.geometry.positions[c[0] as usize - 1]));
+            let triangles = self.cutter.triangulate(&points);
+            for triangle in triangles.map_err(|_| self.too_complex(face, corners))? {
+                let triangle = triangle.map(|corner| match corner {
+                    Corner::Own(i) => *known
+                        .entry(corners[i])
+                        .or_insert_with(|| self.vertex(&mut mesh, corners[i])),
+                    Corner::OnEdge(i, share) => {
+                        let ends = [i, (i + 1) % corners.len()].map(|i| corners[i]);
+                        self.crossing(&mut mesh, ends, share)
+                    }
+                });
+                mesh.triangles.push(triangle);
+            }
+        }
+        Ok(filled(mesh))
+    }
+
+    fn too_complex(&self, face: &Face, corners: &[[u32; 3]]) -> Error {
+        let place = format!("{}, line {}", self.place, face.line);
+        let what = format!(
+            "a face of {} corners that is not convex or crosses itself too often",
+            corners.len()
+        );
+        Error::unsupported(place, what, "divide it into polygons of fewer than 65536 corners")
+    }
+
+    /// Adds a vertex for a corner; its number. What the corner does not say is NaN.
+    fn vertex(&self, mesh: &mut Mesh, [v, vt, vn]: [u32; 3]) -> u32 {
+        let geometry = self.geometry;
+        let [v, vt, vn] = [v, vt, vn].map(|i| (i as usize).wrapping_sub(1));
+        mesh.positions.push((geometry.positions[v] - self.origin).as_vec3());
+        mesh.uvs.push(geometry.uvs.get(vt).copied().unwrap_or(Vec2::NAN));
+        mesh.normals.push(geometry.normals.get(vn).copied().unwrap_or(Vec3::NAN));
+        mesh.colours.extend(self.colours.get(v));
+        mesh.positions.len() as u32 - 1
+    }
+
+    /// Adds a vertex on the edge between two corners; its number.
+    fn crossing(&self, mesh: &mut Mesh, ends: [[u32; 3]; 2], share: f64) -> u32 {
+        let mut between = Mesh::default();
+        for corner in ends {
+            self.vertex(&mut between, corner);
+        }
+        let t = share as f32;
+        let [a, b] = ends.map(|c| self.geometry.positions[c[0] as usize - 1]);
+        mesh.positions.push((a.lerp(b, share) - self.origin).as_vec3());
+        mesh.uvs.push(between.uvs[0].lerp(between.uvs[1], t));
+        mesh.normals.push(between.normals[0].lerp(between.normals[1], t));
+        if let [a, b] = between.colours[..] {
+            mesh.colours.push(a.lerp(b, t));
+        }
+        mesh.positions.len() as u32 - 1
+    }
+}
+
+/// Where the scene is moved from: the middle of what its faces use, where it is so far away
+/// that single precision would show; else the origin.
+fn origin(geometry: &Geometry) -> DVec3 {
+    let used = || geometry.corners.iter().map(|c| geometry.positions[c[0] as usize - 1]);
+    let low = used().fold(DVec3::MAX, DVec3::min);
+    let high = used().fold(DVec3::MIN, DVec3::max);
+    let furthest = low.abs().max(high.abs()).max_element();
+    let is_far = furthest > FAR * (high - low).max_element();
+    if is_far && furthest.is_finite() { (low + high) / 2.0 } else { DVec3::ZERO }
+}
+
+/// The mesh with what its corners do not say filled in.
+fn filled(mut mesh: Mesh) -> Mesh {
+    if mesh.uvs.iter().all(|uv| uv.is_nan()) {
+        mesh.uvs.clear();
+    }
+    for uv in &mut mesh.uvs {
+        let given = if uv.is_nan() { Vec2::ZERO } else { *uv };
+        // OBJ counts v upwards.
+        *uv = Vec2::new(given.x, 1.0 - given.y);
+    }
+    if mesh.normals.iter().all(|n| n.is_nan()) {
+        mesh.normals.clear();
+    } else {
+        fill_normals(&mut mesh);
+    }
+    mesh
+}
+
+/// Gives corners without normals that of their triangle, on vertices of their own.
+fn fill_normals(mesh: &mut Mesh) {
+    for t in 0..mesh.triangles.len() {
+        let corners = mesh.triangles[t].map(|i| i as usize);
+        let [a, b, c] = corners.map(|i| mesh.positions[i]);
+        let flat = (b - a).cross(c - a).try_normalize().unwrap_or(Vec3::Z);
+        for (k, i) in corners.into_iter().enumerate() {
+            if mesh.normals[i].is_nan() {
+                mesh.triangles[t][k] = mesh.positions.len() as u32;
+                mesh.positions.push(mesh.positions[i]);
+                mesh.normals.push(flat);
+                if let Some(uv) = mesh.uvs.get(i).copied() {
+                    mesh.uvs.push(uv);
+                }
+                if let Some(colour) = mesh.colours.get(i).copied() {
+                    mesh.colours.push(colour);
+                }
+            }
+        }
+    }
+    // What is left without a normal is a vertex of no triangle.
+    for normal in mesh.normals.iter_mut().filter(|n| n.is_nan()) {
+        *normal = Vec3::Z;
+    }
+}

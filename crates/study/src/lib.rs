@@ -1,0 +1,7 @@
+//! Measurements of screendoor: metrics, studies, the suite of hard cases and the publications'
+//! experiments.
+
+#![warn(missing_docs)]
+
+pub mod metrics;
+pub mod study;

@@ -1,0 +1,156 @@
+//! How far a picture is from the exact one.
+//!
+//! Errors are in 8-bit units: 1 is 1/255 of the range from black to white. On
+//! linear values they are those of the light itself; on sRGB-encoded ones, those
+//! of the numbers that an 8-bit display would be sent.
+//!
+//! Beside them stand what a viewer would see of an error ([`Flip`]), how it is spread over
+//! spatial frequencies ([`Spectrum`]), what a filter leaves of it ([`filtered_rmse`]), how
+//! it changes from frame to frame ([`Temporal`]) and how it falls with the number of
+//! samples ([`Convergence`]).
+
+mod convergence;
+mod ensemble;
+mod estimate;
+mod filtered;
+mod flip;
+mod planes;
+mod region;
+mod spectrum;
+mod temporal;
+
+use serde::{Deserialize, Serialize};
+
+pub use convergence::Convergence;
+pub use ensemble::{Ensemble, EnsembleErrors};
+pub use estimate::{Estimate, student_t};
+pub use filtered::filtered_rmse;
+pub use flip::{BRIGHTEST, Flip, FlipFigures, FlipMap, PIXELS_PER_DEGREE};
+pub use region::{PixelClasses, Region};
+pub use spectrum::Spectrum;
+pub use temporal::Temporal;
+
+use screendoor_trace::picture::{Picture, srgb};
+use screendoor_trace::tile::TILE_PIXELS;
+
+/// What one unit of an error is of the range from black to white.
+pub const UNIT: f64 = 1.0 / 255.0;
+
+/// The error of one picture over a region, in 8-bit units.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+pub struct Errors {
+    /// How many pixels it is over.
+    pub pixels: u64,
+    /// Root mean square over pixels and channels, on linear values.
+    pub rmse: f64,
+    /// The same on sRGB-encoded values, clamped to their range.
+    pub rmse_srgb: f64,
+    /// Mean of picture minus reference, on linear values.
+    pub mean: f64,
+    /// Largest absolute difference of a channel, on linear values.
+    pub max: f64,
+}
+
+/// The errors of `picture` against `reference` over `region`.
+///
+/// # Panics
+/// Where the frames differ in size.
+pub fn errors(picture: &Picture, reference: &Picture, region: &Region) -> Errors {
+    assert_eq!(picture.grid(), reference.grid());
+    let mut sums = Sums::default();
+    let mut visited = 0;
+    for tile in picture.tiles_with(reference) {
+        let (a, b) = (picture.tile(tile), reference.tile(tile));
+        for within in 0..TILE_PIXELS {
+            if !region.holds(tile, within) {
+                continue;
+            }
+            visited += 1;
+            sums.add(
+                a.map_or(picture.background(), |t| t[within]),
+                b.map_or(reference.background(), |t| t[within]),
+            );
+        }
+    }
+    // The rest of the region shows both backgrounds.
+    sums.add_many(picture.background(), reference.background(), region.pixels() - visited);
+    sums.finish(region.pixels())
+}
+
+#[derive(Default)]
+struct Sums {
+    square: f64,
+    square_srgb: f64,
+    signed: f64,
+    max: f64,
+}
+
+impl Sums {
+    fn add(&mut self, a: [f64; 3], b: [f64; 3]) {
+        self.add_many(a, b, 1);
+    }
+
+    fn add_many(&mut self, a: [f64; 3], b: [f64; 3], times: u64) {
+        if times == 0 {
+            return;
+        }
+        for (a, b) in a.into_iter().zip(b) {
+            let difference = a - b;
+            if difference == 0.0 {
+                continue;
+            }
+            let encoded = srgb::encode(a) - srgb::encode(b);
+            self.square += difference * difference * times as f64;
+            self.square_srgb += encoded * encoded * times as f64;
+            self.signed += difference * times as f64;
+            self.max = self.max.max(difference.abs());
+        }
+    }
+
+    fn finish(&self, pixels: u64) -> Errors {
+        let count = (3 * pixels).max(1) as f64;
+        Errors {
+            pixels,
+            rmse: (self.square / count).sqrt() / UNIT,
+            rmse_srgb: (self.square_srgb / count).sqrt() / UNIT,
+            mean: self.signed / count / UNIT,
+            max: self.max / UNIT,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use screendoor_trace::tile::TileGrid;
+
+    #[test]
+    fn errors_of_known_differences() {
+        let grid = TileGrid::new(20, 10);
+        let reference = Picture::from_fn(grid, |_, _| [0.5; 3]);
+        // One of 200 pixels is off by 0.3 in one channel, another by −0.1 in all.
+        let picture = Picture::from_fn(grid, |x, y| match (x, y) {
+            (3, 3) => [0.8, 0.5, 0.5],
+            (17, 0) => [0.4; 3],
+            _ => [0.5; 3],
+        });
+        let e = errors(&picture, &reference, &Region::frame(grid));
+        assert_eq!(e.pixels, 200);
+        let square: f64 = 0.3 * 0.3 + 3.0 * 0.1 * 0.1;
+        assert!((e.rmse - (square / 600.0).sqrt() * 255.0).abs() < 1e-9);
+        assert!(e.mean.abs() < 1e-9);
+        assert!((e.max - 0.3 * 255.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn untouched_tiles_count_with_their_backgrounds() {
+        let grid = TileGrid::new(100, 100);
+        let black = Picture::new(grid, [0.0; 3]);
+        let white = Picture::new(grid, [1.0; 3]);
+        let e = errors(&white, &black, &Region::frame(grid));
+        assert_eq!((e.rmse, e.mean, e.max), (255.0, 255.0, 255.0));
+        assert!((e.rmse_srgb - 255.0).abs() < 1e-9);
+        let none = errors(&black, &black, &Region::frame(grid));
+        assert_eq!((none.rmse, none.max), (0.0, 0.0));
+    }
+}

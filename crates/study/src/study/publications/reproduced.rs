@@ -1,0 +1,74 @@
+//! One publication's figures, measured: what a study asks for by name.
+
+use std::path::Path;
+
+use screendoor_trace::error::Result;
+use crate::study::comparison::{Comparison, compare, compare_slab};
+use crate::study::file::Publication;
+use crate::study::publications::methods::{Methods, methods};
+use crate::study::publications::{Effort, Publications, reproduce};
+use crate::study::stress::{Stability, stress_designs};
+
+/// What was measured of a publication.
+#[derive(Debug)]
+pub enum Reproduced {
+    /// [`Publication::LaineKarras`].
+    LaineKarras(Box<Publications>),
+    /// [`Publication::Methods`].
+    Methods(Box<Methods>),
+    /// [`Publication::Slab`].
+    Slab(Box<Comparison>),
+    /// [`Publication::Comparison`].
+    Comparison(Box<Comparison>),
+    /// [`Publication::Stability`].
+    Stability(Box<Stability>),
+}
+
+impl Reproduced {
+    /// Which publication it is.
+    pub fn publication(&self) -> Publication {
+        match self {
+            Reproduced::LaineKarras(_) => Publication::LaineKarras,
+            Reproduced::Methods(_) => Publication::Methods,
+            Reproduced::Slab(_) => Publication::Slab,
+            Reproduced::Comparison(_) => Publication::Comparison,
+            Reproduced::Stability(_) => Publication::Stability,
+        }
+    }
+
+    /// Models that were not given, whose tables are left out.
+    pub fn missing(&self) -> &[&'static str] {
+        match self {
+            Reproduced::LaineKarras(p) => &p.missing,
+            Reproduced::Methods(_) | Reproduced::Stability(_) => &[],
+            Reproduced::Slab(c) | Reproduced::Comparison(c) => &c.missing,
+        }
+    }
+}
+
+/// Measures a publication, with models from the folder `models` where one is given.
+/// `progress` is told what runs.
+///
+/// # Errors
+/// As [`reproduce`], [`methods`], [`compare`] and [`stress_designs`].
+pub fn measure_publication(
+    publication: Publication,
+    models: Option<&Path>,
+    effort: Effort,
+    progress: impl FnMut(&str, u64, u64),
+) -> Result<Reproduced> {
+    let (side, seeds) = (effort.comparison_side, effort.seeds);
+    Ok(match publication {
+        Publication::LaineKarras => {
+            Reproduced::LaineKarras(Box::new(reproduce(models, effort, progress)?))
+        }
+        Publication::Methods => Reproduced::Methods(Box::new(methods(models, effort, progress)?)),
+        Publication::Slab => {
+            Reproduced::Slab(Box::new(compare_slab(models, side, seeds, progress)?))
+        }
+        Publication::Comparison => {
+            Reproduced::Comparison(Box::new(compare(models, side, seeds, progress)?))
+        }
+        Publication::Stability => Reproduced::Stability(Box::new(stress_designs(16, progress)?)),
+    })
+}

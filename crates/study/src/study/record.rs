@@ -1,0 +1,252 @@
+//! The one record of results: what every table, chart and export is made of.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::metrics::{EnsembleErrors, Estimate};
+use screendoor_rop::{EventCounts, Promises, StateBits};
+use crate::study::throughput::Spread;
+
+/// Part of a record, for those who read records alone.
+pub use screendoor_rop::Promise;
+
+/// One design at one sample count on one scene, over all seeds of the study.
+///
+/// Everything but [`Record::speed`] is a pure function of the study: measured again, on
+/// whatever machine, it is the same to the last bit.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Record {
+    /// Names the run within its study: a file name on every system.
+    pub id: String,
+    /// The scene's name in the study.
+    pub scene: String,
+    /// BLAKE3 of the trace's content.
+    pub trace: String,
+    /// The design as the study has it, the same at all sample counts: `kbuffer:layers={n}`.
+    pub series: String,
+    /// Name and changed parameters at this sample count: `kbuffer:layers=8`.
+    pub design: String,
+    /// The design's family: `stochastic`, `layered`, …
+    pub family: String,
+    /// What it promises with these parameters.
+    pub promises: Promised,
+    /// Samples per pixel.
+    pub samples: u32,
+    /// Seeds that were replayed, from the study's first on; 1 where no seed changes anything.
+    pub seeds: u32,
+    /// Fragments of the trace that cover one of these samples.
+    pub fragments: u64,
+    /// Those of them that share a depth with another one at a sample: where there are any,
+    /// promises that ask for distinct depths are not kept.
+    pub tied_fragments: u64,
+    /// Errors against the exact picture of the same samples over the whole frame.
+    pub frame: EnsembleErrors,
+    /// The same over the pixels with at least one fragment. The figure of the charts.
+    pub covered: EnsembleErrors,
+    /// The same over covered pixels that no primitive's edge crosses.
+    pub interior: EnsembleErrors,
+    /// The same over the other covered pixels.
+    pub edges: EnsembleErrors,
+    /// RMSE over all covered pixels against the exact picture of all of the trace's
+    /// samples, in 8-bit units on linear values: missing antialiasing counts.
+    pub fine: Estimate,
+    /// RMSE over the covered pixels after a Gaussian on the error, in 8-bit units: what is
+    /// left of it from afar. Empty where it was not asked for.
+    pub filtered: Vec<Filtered>,
+    /// FLIP of the pictures as a display of standard range shows them.
+    pub flip: Option<FlipOverSeeds>,
+    /// FLIP over all exposures in which something shows.
+    pub flip_hdr: Option<FlipOverSeeds>,
+    /// The error's spectrum, mean over seeds.
+    pub spectrum: Option<SpectrumOverSeeds>,
+    /// What the design did with the first seed.
+    pub events: EventCounts,
+    /// State per pixel.
+    pub state_bits: StateBits,
+    /// How it is made up: `8 × (32 depth + 48 colour) + 40 tracking`.
+    pub layout: String,
+    /// Passes over the trace.
+    pub passes: u32,
+    /// Tiles that at least one fragment touched.
+    pub touched_tiles: u64,
+    /// BLAKE3 of the first seed's picture.
+    pub picture: String,
+    /// How fast engines replay it, by their names. Measured: no two runs give the same.
+    pub speed: BTreeMap<String, Speed>,
+}
+
+/// What a design promises, as far as one chooses by it. Under what condition is said with
+/// it; [`Record::kept`] is what comes of it on the record's scene.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Promised {
+    /// Its expectation over seeds is the exact picture.
+    pub unbiased: Promise,
+    /// Its picture approaches the exact one as samples increase.
+    pub consistent: Promise,
+    /// Its picture is the same in any order of fragments, but for rounding.
+    pub same_picture: bool,
+    /// Its expectation over seeds is the same in any order of fragments, but for rounding.
+    /// How far pictures scatter about it may still depend on the order.
+    pub same_expectation: Promise,
+    /// Its picture depends on the seed: it is noise, not structure.
+    pub seeded: bool,
+}
+
+/// The promises that are kept on some scenes.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Kept {
+    /// As [`Promised::unbiased`].
+    pub unbiased: bool,
+    /// As [`Promised::consistent`].
+    pub consistent: bool,
+    /// As [`Promised::same_picture`].
+    pub same_picture: bool,
+    /// As [`Promised::same_expectation`].
+    pub same_expectation: bool,
+}
+
+impl From<Promises> for Promised {
+    fn from(promises: Promises) -> Self {
+        Promised {
+            unbiased: promises.unbiased,
+            consistent: promises.consistent,
+            same_picture: promises.same_picture(),
+            same_expectation: promises.same_expectation(),
+            seeded: promises.seeded,
+        }
+    }
+}
+
+impl Promised {
+    /// What is kept where so many fragments share a depth with another.
+    pub fn kept(self, tied_fragments: u64) -> Kept {
+        Kept {
+            unbiased: self.unbiased.holds(tied_fragments),
+            consistent: self.consistent.holds(tied_fragments),
+            same_picture: self.same_picture,
+            same_expectation: self.same_expectation.holds(tied_fragments),
+        }
+    }
+}
+
+impl Kept {
+    /// What is kept here and there.
+    pub fn and(self, other: Kept) -> Kept {
+        Kept {
+            unbiased: self.unbiased && other.unbiased,
+            consistent: self.consistent && other.consistent,
+            same_picture: self.same_picture && other.same_picture,
+            same_expectation: self.same_expectation && other.same_expectation,
+        }
+    }
+}
+
+/// Error after a Gaussian.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Filtered {
+    /// Its standard deviation in pixels.
+    pub sigma: f64,
+    /// What is left, in 8-bit units.
+    pub rmse: Estimate,
+}
+
+/// FLIP of several seeds: 0 (the same) to 1.
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FlipOverSeeds {
+    /// Mean over the frame.
+    pub mean: Estimate,
+    /// Weighted first quartile, median and third quartile.
+    pub quartiles: [Estimate; 3],
+}
+
+/// Radially averaged power spectrum.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SpectrumOverSeeds {
+    /// Centres of the bins in cycles per pixel.
+    pub frequency: Vec<f64>,
+    /// Mean power density in each, in squared 8-bit units: white noise has its variance
+    /// in every bin.
+    pub power: Vec<f64>,
+    /// How blue it is, in decibels: 0 for white noise, above for blue. `None` where
+    /// there is no error.
+    pub blueness: Option<Estimate>,
+}
+
+/// How fast an engine replays a trace.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Speed {
+    /// Seconds from the file to the picture; `None` where the engine cannot do it.
+    pub seconds: Option<Spread>,
+    /// Seconds in which a GPU draws, by its own clock.
+    pub kernel: Option<Spread>,
+    /// Whether its picture is bit for bit the one that the errors are of.
+    pub same_bits: Option<bool>,
+    /// Why there is no figure.
+    pub missing: Option<String>,
+}
+
+impl Record {
+    /// State in bytes per pixel, as hardware would hold it; `None` where it grows with
+    /// the fragments.
+    pub fn state_bytes(&self) -> Option<f64> {
+        (!self.state_bits.unbounded).then(|| f64::from(self.state_bits.total()) / 8.0)
+    }
+
+    /// `None` where nothing was counted: a design that draws counts its fragments.
+    fn per_fragment(&self, count: f64) -> Option<f64> {
+        let counted = self.fragments > 0 && self.events.fragments > 0;
+        counted.then(|| count / self.fragments as f64)
+    }
+
+    /// Bytes of pixel state read and written for each fragment of the trace, over all passes.
+    pub fn bytes_moved_per_fragment(&self) -> Option<f64> {
+        let bits = self.events.state_bits_read + self.events.state_bits_written;
+        self.per_fragment(bits as f64 / 8.0)
+    }
+
+    /// Hashes evaluated for each fragment of the trace.
+    pub fn hashes_per_fragment(&self) -> Option<f64> {
+        self.per_fragment(self.events.hashes as f64)
+    }
+
+    /// Comparisons of depths for each fragment of the trace: depth tests, and those of
+    /// sorting networks ([`EventCounts::comparators`]).
+    pub fn comparators_per_fragment(&self) -> Option<f64> {
+        self.per_fragment(self.events.comparators() as f64)
+    }
+
+    /// An engine's nanoseconds for each fragment of the trace.
+    pub fn nanoseconds_per_fragment(&self, engine: &str) -> Option<Spread> {
+        let seconds = self.speed.get(engine)?.seconds?;
+        let each = |s: f64| s * 1e9 / self.fragments as f64;
+        (self.fragments > 0).then(|| Spread {
+            low: each(seconds.low),
+            median: each(seconds.median),
+            high: each(seconds.high),
+        })
+    }
+
+    /// The promises that are kept on this scene.
+    pub fn kept(&self) -> Kept {
+        self.promises.kept(self.tied_fragments)
+    }
+
+    /// The share of the fragments that share a depth with another, 0 to 1; `None` where
+    /// there are none.
+    pub fn tied_share(&self) -> Option<f64> {
+        (self.fragments > 0).then(|| self.tied_fragments as f64 / self.fragments as f64)
+    }
+
+    /// Whether seeds change the picture and only one was replayed, so that neither the mean
+    /// error has an interval nor variance and bias are known.
+    pub fn is_one_draw(&self) -> bool {
+        self.promises.seeded && self.seeds < 2
+    }
+}

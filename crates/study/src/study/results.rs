@@ -1,0 +1,131 @@
+//! All that a study has measured, as reports take it.
+
+use serde::{Deserialize, Serialize};
+
+use crate::study::file::Study;
+use crate::study::record::Record;
+use screendoor_trace::trace::Statistics;
+
+/// A study with what has been measured of it.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Results {
+    /// What was to be measured, every default filled in.
+    pub study: Study,
+    /// On what machine.
+    pub machine: Machine,
+    /// The scenes whose traces are known, in the study's order.
+    pub scenes: Vec<SceneFacts>,
+    /// What has been measured: scene after scene, sample count after sample count, designs
+    /// in the study's order.
+    pub records: Vec<Record>,
+    /// What has not, in the same order.
+    pub missing: Vec<Missing>,
+}
+
+/// A scene's trace.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneFacts {
+    /// The scene's name in the study.
+    pub name: String,
+    /// The trace's file, seen from the results' folder where it lies in there.
+    pub trace: String,
+    /// BLAKE3 of its content.
+    pub content: String,
+    /// Frame width and height in pixels.
+    pub size: [u32; 2],
+    /// Samples per pixel that it has.
+    pub samples: u32,
+    /// Where it comes from.
+    pub source: String,
+    /// The camera.
+    pub camera: String,
+    /// What its file holds and is not drawn, a line for each kind.
+    #[serde(default)]
+    pub warnings: Vec<String>,
+    /// The pixel that the report's inspector opens at.
+    pub pixel: [u16; 2],
+    /// It in numbers.
+    pub statistics: Statistics,
+}
+
+/// Where and with what a study was run.
+#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Machine {
+    /// This program's version.
+    pub screendoor: String,
+    /// The processor's name.
+    pub processor: String,
+    /// Threads that replay.
+    pub threads: usize,
+    /// Bytes of memory, where the system tells.
+    pub memory: Option<u64>,
+    /// The operating system and the processor's kind.
+    pub system: String,
+    /// The instruction set of the fast engines.
+    pub vectors: String,
+    /// The GPU and its driver, where one was used.
+    pub gpu: Option<String>,
+}
+
+/// A run without a result.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Missing {
+    /// The run.
+    pub id: String,
+    /// Its scene.
+    pub scene: String,
+    /// Its design, as the study has it.
+    pub series: String,
+    /// Its samples per pixel.
+    pub samples: u32,
+    /// Why; `None` where it has not been run yet.
+    pub why: Option<String>,
+}
+
+impl Machine {
+    /// What is known of it, for people: what it is, and how much or which.
+    pub fn facts(&self) -> Vec<(&'static str, String)> {
+        let gib = |bytes: u64| format!("{:.0} GiB", bytes as f64 / (1_u64 << 30) as f64);
+        let facts = [
+            ("screendoor", self.screendoor.clone()),
+            ("Processor", self.processor.clone()),
+            ("Threads", self.threads.to_string()),
+            ("Memory", self.memory.map(gib).unwrap_or_default()),
+            ("System", self.system.clone()),
+            ("Vector instructions", self.vectors.clone()),
+            ("GPU", self.gpu.clone().unwrap_or_default()),
+        ];
+        facts.into_iter().filter(|(_, value)| !value.is_empty()).collect()
+    }
+}
+
+impl Missing {
+    /// Why there is no result, in words.
+    pub fn reason(&self) -> &str {
+        self.why.as_deref().unwrap_or("not run yet")
+    }
+}
+
+impl Results {
+    /// The names of the engines of the study and of its records, those of the study first.
+    pub fn engines(&self) -> Vec<String> {
+        let of_study = self.study.engines.iter().map(|e| e.name().to_string());
+        let of_records = self.records.iter().flat_map(|r| r.speed.keys().cloned());
+        let mut list: Vec<String> = Vec::new();
+        for engine in of_study.chain(of_records) {
+            if !list.contains(&engine) {
+                list.push(engine);
+            }
+        }
+        list
+    }
+
+    /// The record of a design at a sample count on a scene.
+    pub fn record(&self, scene: &str, series: &str, samples: u32) -> Option<&Record> {
+        let wanted = |r: &&Record| r.scene == scene && r.series == series && r.samples == samples;
+        self.records.iter().find(wanted)
+    }
+}

@@ -1,0 +1,229 @@
+//! A study's scenes as traces.
+
+use std::path::Path;
+
+use screendoor_scene::capture::Capture;
+use screendoor_designs::{REFERENCE, configure};
+use screendoor_trace::error::{Error, Result};
+use crate::metrics::{Flip, PixelClasses, Region};
+use screendoor_trace::output::OutputFile;
+use screendoor_trace::picture::Picture;
+use screendoor_scene::scene;
+use crate::study::file::{Metric, SceneEntry, Study};
+use crate::study::results::SceneFacts;
+use crate::study::run::store::Store;
+use crate::study::throughput::work;
+use screendoor_trace::tile::{TILE_PIXELS, TileGrid, TileMap};
+use screendoor_trace::trace::{Trace, TraceWriter, WriteOptions, statistics, tied_fragments};
+
+/// What runs are told of.
+pub type Watch<'a> = &'a (dyn Fn(&str) + Sync);
+
+/// A scene that is being measured.
+pub(super) struct OpenScene {
+    /// Its trace.
+    pub trace: Trace,
+    /// What is told of it.
+    pub facts: SceneFacts,
+    /// The exact picture of all samples.
+    pub fine: Picture,
+    /// The pixels that fragments cover, of all samples.
+    pub fine_covered: Region,
+}
+
+impl OpenScene {
+    /// Opens the scene's trace; draws it where it is not there yet. `base` is the folder
+    /// that the study's paths are seen from.
+    ///
+    /// # Errors
+    /// As [`scene::load`], [`Trace::open`] and [`screendoor_designs::Configured::replay`];
+    /// [`Error::Invalid`] where the trace is not the one that was measured before.
+    pub fn open(store: &Store, index: usize, base: &Path, watch: Watch<'_>) -> Result<Self> {
+        let entry = &store.study().scenes[index];
+        let own = store.folder().join(store.trace_name(index));
+        let mut warnings = None;
+        let (path, shown) = match &entry.trace {
+            Some(trace) => (base.join(trace), base.join(trace).display().to_string()),
+            None => {
+                if !own.exists() {
+                    watch(&format!("capturing {}", entry.name));
+                    warnings = Some(draw(entry, base, &own)?);
+                }
+                (own, store.trace_name(index))
+            }
+        };
+        let trace = Trace::open(&path)?;
+        let warnings = || match warnings {
+            Some(warnings) => Ok(warnings),
+            // Drawn by a process that ended before it could say so.
+            None => entry.source.as_deref().map_or(Ok(Vec::new()), |source| {
+                Ok(scene::load(&scene::seen_from(source, base))?.warnings)
+            }),
+        };
+        let facts = facts(store, index, &trace, shown, warnings, watch)?;
+        let all = trace.header().pattern.samples();
+        watch(&format!("{REFERENCE} at {all} on {}", entry.name));
+        let fine = exact(store.study(), &trace, all)?;
+        let fine_covered = PixelClasses::of(&trace, all)?.covered;
+        Ok(OpenScene { trace, facts, fine, fine_covered })
+    }
+}
+
+fn exact(study: &Study, trace: &Trace, samples: u32) -> Result<Picture> {
+    let design = configure(REFERENCE, &[])?;
+    Ok(design.replay(trace, samples, 0, &study.replay_options())?.picture)
+}
+
+/// Draws a scene into the trace at `path`. Returns what of it is not drawn.
+fn draw(entry: &SceneEntry, base: &Path, path: &Path) -> Result<Vec<String>> {
+    let source = entry.source.as_deref().unwrap_or("");
+    let mut scene = scene::load(&scene::seen_from(source, base))?;
+    if let Some(texture) = &entry.texture {
+        scene.apply_texture(&base.join(texture))?;
+    }
+    if entry.white {
+        scene.whiten();
+    }
+    let options = entry.options();
+    let capture = Capture::new(&scene, &options)?;
+    let file = OutputFile::create(path)?;
+    let place = path.display().to_string();
+    let mut writer =
+        TraceWriter::new(file, &place, capture.header().clone(), WriteOptions::default())?;
+    capture.draw(&mut writer, |_, _| ())?;
+    writer.finish()?.0.commit()?;
+    drop(capture);
+    Ok(scene.warnings)
+}
+
+/// The facts of a scene, written where they are not there yet.
+fn facts(
+    store: &Store,
+    index: usize,
+    trace: &Trace,
+    shown: String,
+    warnings: impl FnOnce() -> Result<Vec<String>>,
+    watch: Watch<'_>,
+) -> Result<SceneFacts> {
+    let entry = &store.study().scenes[index];
+    let content = match trace.content() {
+        Some(content) => content.to_string(),
+        None => trace.verify(|_| ())?,
+    };
+    if let Some(facts) = store.facts(index)? {
+        if facts.content != content {
+            return Err(Error::invalid(
+                trace.place(),
+                format_args!("scene '{}' was another one when the study was begun", entry.name),
+                "bring its old trace back, or begin in another folder",
+            ));
+        }
+        return Ok(facts);
+    }
+    watch(&format!("counting {}", entry.name));
+    let header = trace.header();
+    let facts = SceneFacts {
+        name: entry.name.clone(),
+        trace: shown,
+        content,
+        size: [header.width, header.height],
+        samples: header.pattern.samples(),
+        source: header.source.clone(),
+        camera: header.camera.clone(),
+        warnings: warnings()?,
+        pixel: match entry.pixel {
+            Some(pixel) => pixel,
+            None => telling_pixel(trace)?,
+        },
+        statistics: statistics(trace, |_| ())?,
+    };
+    Store::put_sealed(&store.scene_file(index), &facts)?;
+    Ok(facts)
+}
+
+/// Fragments in a pixel that are enough to see how a design works and few enough to read.
+const TELLING: f64 = 6.0;
+
+/// The pixel that tells most, the one nearest the frame's centre where several do: with
+/// [`TELLING`] fragments, all of which cover all samples. A fragment more or less counts as
+/// much as one that covers next to nothing.
+fn telling_pixel(trace: &Trace) -> Result<[u16; 2]> {
+    let header = trace.header();
+    let grid = TileGrid::new(header.width, header.height);
+    let all = f64::from(header.pattern.samples());
+    // Fragments, and how much of the pixel they leave uncovered.
+    let mut pixels: TileMap<Box<[(f64, f64); TILE_PIXELS]>> = TileMap::new(grid);
+    for batch in trace.batches() {
+        for f in batch?.iter() {
+            let tile = pixels
+                .get_or_insert_with(grid.tile(f.x, f.y), || Box::new([(0.0, 0.0); TILE_PIXELS]));
+            let (fragments, uncovered) = &mut tile[TileGrid::within(f.x, f.y)];
+            *fragments += 1.0;
+            *uncovered += 1.0 - f64::from(f.coverage.count()) / all;
+        }
+    }
+    let centre = [header.width / 2, header.height / 2];
+    let mut best = (f64::INFINITY, u64::MAX, centre);
+    for (tile, pixels) in pixels.touched() {
+        for (within, (fragments, uncovered)) in pixels.iter().enumerate() {
+            if *fragments == 0.0 {
+                continue;
+            }
+            let (x, y) = grid.pixel(*tile, within);
+            let square = |a: u32, b: u32| u64::from(a.abs_diff(b)).pow(2);
+            let distance = square(x, centre[0]) + square(y, centre[1]);
+            let lack = (fragments - TELLING).abs() + uncovered;
+            if (lack, distance, [x, y]) < best {
+                best = (lack, distance, [x, y]);
+            }
+        }
+    }
+    Ok(best.2.map(|c| c as u16))
+}
+
+/// What all runs at one sample count of a scene share.
+pub(super) struct Reference {
+    pub samples: u32,
+    /// The exact picture of the same samples.
+    pub picture: Picture,
+    pub frame: Region,
+    pub classes: PixelClasses,
+    /// Fragments that cover one of the samples.
+    pub fragments: u64,
+    /// Those of them that share a depth with another at one of the samples.
+    pub tied_fragments: u64,
+    /// Comparison to the picture as a viewer sees it, where it is asked for.
+    pub flip: Option<Flip>,
+}
+
+impl Reference {
+    /// Makes it.
+    ///
+    /// # Errors
+    /// As [`screendoor_designs::Configured::replay`].
+    pub fn of(store: &Store, scene: &OpenScene, samples: u32) -> Result<Self> {
+        let study = store.study();
+        let trace = &scene.trace;
+        trace.header().pattern.prefix(samples)?;
+        let picture = if samples == trace.header().pattern.samples() {
+            scene.fine.clone()
+        } else {
+            exact(study, trace, samples)?
+        };
+        let seen = [Metric::Flip, Metric::FlipHdr].iter().any(|m| study.takes(*m));
+        Ok(Reference {
+            samples,
+            frame: Region::frame(picture.grid()),
+            classes: PixelClasses::of(trace, samples)?,
+            fragments: work(trace, samples)?.fragments,
+            // What no two share at all samples they do not at some.
+            tied_fragments: match scene.facts.statistics.tied_fragments {
+                0 => 0,
+                all if samples == trace.header().pattern.samples() => all,
+                _ => tied_fragments(trace, samples)?,
+            },
+            flip: seen.then(|| Flip::new(&picture)),
+            picture,
+        })
+    }
+}
