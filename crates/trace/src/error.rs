@@ -110,7 +110,7 @@ impl Error {
 
 /// The name among `known` that is nearest to `name`, whatever the case of its letters, where
 /// one is near.
-pub(crate) fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let name = name.to_lowercase();
     let scored = known.into_iter().map(|k| (strsim::jaro_winkler(&name, &k.to_lowercase()), k));
     let (score, known) = scored.max_by(|a, b| a.0.total_cmp(&b.0))?;
@@ -119,7 +119,7 @@ pub(crate) fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) 
 
 /// What libraries and files say, fit for one line: each run of line breaks, tabs and other
 /// control characters becomes a space.
-pub(crate) fn one_line(text: impl Display) -> String {
+pub fn one_line(text: impl Display) -> String {
     let text = text.to_string();
     let words: Vec<&str> = text.split(char::is_control).filter(|w| !w.is_empty()).collect();
     if words.len() < 2 { words.concat() } else { words.join(" ") }

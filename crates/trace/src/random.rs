@@ -18,7 +18,7 @@ pub const fn mix(mut x: u32) -> u32 {
 }
 
 /// The factors of [`mix`].
-pub(crate) const MIX: [u32; 2] = [0x7feb_352d, 0x846c_a68b];
+pub const MIX: [u32; 2] = [0x7feb_352d, 0x846c_a68b];
 
 /// The fraction of the golden ratio, of 2^32: far from any small number.
 pub const GOLDEN: u32 = 0x9e37_79b9;

@@ -8,8 +8,8 @@ pub mod srgb;
 mod write;
 
 pub use opened::{AlphaDifference, Laid, Opened, Window, lay};
-pub(crate) use png_chunks::necessary_chunks;
-pub(crate) use read::can_hold;
+pub use png_chunks::necessary_chunks;
+pub use read::can_hold;
 pub use read::{layers, open, read};
 pub use write::{Layer, PictureFile, write_exr, write_png};
 
@@ -33,7 +33,7 @@ impl Picture {
     }
 
     /// A picture made of finished tiles.
-    pub(crate) fn from_tiles(background: [f64; 3], tiles: TileMap<TilePixels>) -> Self {
+    pub fn from_tiles(background: [f64; 3], tiles: TileMap<TilePixels>) -> Self {
         Picture { background, tiles }
     }
 

@@ -9,7 +9,7 @@ const AROUND: usize = 12;
 /// The file without the chunks that say nothing of its pixels: colour profiles and texts are
 /// compressed, and decoders unpack them to any size before they reach the first pixel. What
 /// is damaged stays as it is, for the decoder to tell.
-pub(crate) fn necessary_chunks(bytes: &[u8]) -> Cow<'_, [u8]> {
+pub fn necessary_chunks(bytes: &[u8]) -> Cow<'_, [u8]> {
     let mut kept: Vec<&[u8]> = Vec::new();
     let mut rest = bytes;
     if let Some(chunks) = bytes.strip_prefix(SIGNATURE) {

@@ -122,7 +122,7 @@ const DEFLATE: u64 = 1032;
 
 /// Whether a PNG (or JPEG, which packs less) of so many bytes can hold so many pixels, each
 /// of which takes a bit at least.
-pub(crate) fn can_hold(bytes: &[u8], width: u32, height: u32) -> bool {
+pub fn can_hold(bytes: &[u8], width: u32, height: u32) -> bool {
     u64::from(width) * u64::from(height) / 8 / DEFLATE <= bytes.len() as u64
 }
 

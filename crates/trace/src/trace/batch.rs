@@ -126,7 +126,7 @@ impl Batch {
     }
 
     /// The pixels' columns and rows.
-    pub(crate) fn places(&self) -> [&Column<u16>; 2] {
+    pub fn places(&self) -> [&Column<u16>; 2] {
         [&self.x, &self.y]
     }
 

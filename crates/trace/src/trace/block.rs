@@ -15,7 +15,7 @@ use crate::trace::fragment::{DepthPlane, Fragment, SampleMask, Unorm32};
 pub const BLOCK: usize = 256;
 
 /// Rows of a stretch, at most.
-pub(crate) const STRETCH: usize = 16;
+pub const STRETCH: usize = 16;
 
 /// A column of a block, with room for what a copy writes beyond its end.
 type Values<T> = [T; BLOCK + STRETCH];
@@ -26,21 +26,21 @@ type Values<T> = [T; BLOCK + STRETCH];
 #[derive(Clone, Debug)]
 pub struct Block {
     len: usize,
-    pub(crate) x: Values<u16>,
-    pub(crate) y: Values<u16>,
-    pub(crate) coverage: Values<u64>,
-    pub(crate) z: Values<u32>,
-    pub(crate) dzdx: Values<i32>,
-    pub(crate) dzdy: Values<i32>,
-    pub(crate) colour: [Values<f32>; 3],
-    pub(crate) alpha: Values<f32>,
-    pub(crate) primitive: Values<u32>,
-    pub(crate) object: Values<u32>,
+    pub x: Values<u16>,
+    pub y: Values<u16>,
+    pub coverage: Values<u64>,
+    pub z: Values<u32>,
+    pub dzdx: Values<i32>,
+    pub dzdy: Values<i32>,
+    pub colour: [Values<f32>; 3],
+    pub alpha: Values<f32>,
+    pub primitive: Values<u32>,
+    pub object: Values<u32>,
 }
 
 /// At most [`STRETCH`] rows of a batch, one after the other.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) struct Stretch(u32);
+pub struct Stretch(u32);
 
 impl Stretch {
     /// `count` rows, at least one, from row `start` on.
@@ -155,7 +155,7 @@ impl Block {
 
     /// Adds stretches of `batch` while there is room, their coverage within `mask`, with the
     /// instructions of `level`; tells how many.
-    pub(crate) fn gather(
+    pub fn gather(
         &mut self,
         level: Level,
         batch: &Batch,

@@ -29,7 +29,7 @@ mod write;
 
 pub use batch::{Batch, MAX_BATCH_ROWS};
 pub use block::{BLOCK, Block};
-pub(crate) use block::{STRETCH, Stretch};
+pub use block::{STRETCH, Stretch};
 pub use column::{ChannelColumn, Column, ColumnId, CoverageColumn, Native, Scalar, ValueType};
 pub use fragment::{DepthPlane, Fragment, MAX_SAMPLES, SampleMask, Unorm32};
 pub use header::{ColourFormat, FORMAT_VERSION, Header, MAX_SIDE, SamplePattern};
