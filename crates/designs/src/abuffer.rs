@@ -2,13 +2,13 @@
 //! gives it): a pixel's fragments as they come, sorted when it is resolved. What
 //! becomes of fragments that find the list full is a parameter.
 
-use screendoor_trace::error::Result;
-use screendoor_trace::param::{Param, Values};
 use screendoor_rop::layers::{COVERAGE, DEPTH_BITS, LAYERS, Layer, Layering, composite, contents};
 use screendoor_rop::{
     Blueprint, Contents, Family, Frame, Info, Layout, OpaquePromise, OrderPromise, OverOpaque,
     Probe, Promises, Site, Transparent, colour, network_comparators, over_opaque,
 };
+use screendoor_trace::error::Result;
+use screendoor_trace::param::{Param, Values};
 use screendoor_trace::trace::Fragment;
 
 screendoor_trace::options! {

@@ -12,8 +12,6 @@
 //! visibility, and a removed node's samples are joined to those of the node before
 //! it, over which their transmittance is averaged.
 
-use screendoor_trace::error::Result;
-use screendoor_trace::param::Values;
 use screendoor_rop::layers::{
     COVERAGE, Columns, DEPTH_BITS, LAYERS, Layer, composite, contents, insert, nearer, room,
 };
@@ -21,6 +19,8 @@ use screendoor_rop::{
     Blueprint, Contents, Family, Frame, Info, Layout, OpaquePromise, OrderPromise, OverOpaque,
     Probe, Promises, Site, Transparent, colour, over_opaque,
 };
+use screendoor_trace::error::Result;
+use screendoor_trace::param::Values;
 use screendoor_trace::trace::Fragment;
 
 /// The design's entry in the registry.

@@ -2,13 +2,13 @@
 //! the known wrong answer. Layers of one alpha cover the same samples and hide each
 //! other instead of blending (Enderton et al. 2011, section 2).
 
-use screendoor_trace::error::Result;
-use screendoor_trace::param::Values;
 use screendoor_rop::stochastic::{self, Round, Sampler, Stochastic};
 use screendoor_rop::{
     Blueprint, Family, Frame, Info, OpaquePromise, OrderPromise, Probe, Promises, Site, Threshold,
     colour, depth_bits,
 };
+use screendoor_trace::error::Result;
+use screendoor_trace::param::Values;
 use screendoor_trace::trace::{Fragment, SampleMask, Unorm32};
 
 /// The design's entry in the registry.

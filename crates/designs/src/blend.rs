@@ -1,13 +1,13 @@
 //! Alpha blending in the order in which fragments arrive: what hardware does by
 //! itself, at the least cost, and wrong wherever something nearer came first.
 
-use screendoor_trace::error::Result;
-use screendoor_trace::param::Values;
 use screendoor_rop::over_opaque;
 use screendoor_rop::{
     BlendBuffer, Blueprint, ColourStore, Contents, Family, Frame, Info, Layout, Opaque,
     OpaquePromise, OrderPromise, OverOpaque, Probe, Promises, Site, Transparent, colour,
 };
+use screendoor_trace::error::Result;
+use screendoor_trace::param::Values;
 use screendoor_trace::trace::Fragment;
 
 /// The design's entry in the registry.

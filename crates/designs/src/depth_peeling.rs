@@ -7,13 +7,13 @@
 //! latest of them is peeled, the others are lost. `ties=kept` numbers the fragments
 //! of a pass and compares the numbers where depths are equal, so that none is.
 
-use screendoor_trace::error::Result;
-use screendoor_trace::param::{Param, Values};
 use screendoor_rop::layers::{LAYERS, room};
 use screendoor_rop::{
     Blueprint, ColourStore, Contents, Family, Frame, Info, Layout, OpaquePromise, OrderPromise,
     OverOpaque, Probe, Promises, Site, Transparent, colour, over_opaque,
 };
+use screendoor_trace::error::Result;
+use screendoor_trace::param::{Param, Values};
 use screendoor_trace::trace::{Fragment, SampleMask, Unorm32};
 
 screendoor_trace::options! {

@@ -4,14 +4,14 @@ use std::fmt;
 use std::sync::Arc;
 
 use crate::DESIGNS;
-use screendoor_trace::error::{Error, Result};
-use screendoor_trace::param::Values;
 use screendoor_rop::fast::{Count, Width};
 use screendoor_rop::stochastic::draws_opaque_first;
 use screendoor_rop::{
     Blueprint, Engine, ExplainLimits, Explanation, Frame, Info, Layout, Port, PrimitiveDepths,
     Promises, ReplayOptions, Replayed, Site, StateBits, Which, explain, replay,
 };
+use screendoor_trace::error::{Error, Result};
+use screendoor_trace::param::Values;
 use screendoor_trace::trace::Trace;
 
 /// A design in the registry. The types behind it are known here and nowhere

@@ -7,14 +7,14 @@
 //! depth scaled to pixels, hashed with its object's number: the same statistics in a
 //! still picture, without the stability that is the method's aim.
 
-use screendoor_trace::error::Result;
-use screendoor_trace::param::{Param, Values};
-use screendoor_trace::random::hash;
 use screendoor_rop::stochastic::{self, Round, Sampler, Stochastic};
 use screendoor_rop::{
     Blueprint, Family, Frame, Info, OpaquePromise, OrderPromise, Probe, Promises, Site, Threshold,
     colour, depth_bits,
 };
+use screendoor_trace::error::Result;
+use screendoor_trace::param::{Param, Values};
+use screendoor_trace::random::hash;
 use screendoor_trace::trace::{Fragment, SampleMask, Unorm32};
 
 screendoor_trace::options! {

@@ -2,13 +2,13 @@
 //! layers are the core, composited in order; all others are the tail, of which a
 //! weighted average is kept (Bavoil, Myers 2008).
 
-use screendoor_trace::error::Result;
-use screendoor_trace::param::Values;
 use screendoor_rop::layers::{COVERAGE, LAYERS, Layer, Layering, composite, contents};
 use screendoor_rop::{
     Blueprint, ColourStore, Contents, Family, Frame, Info, Layout, OpaquePromise, OrderPromise,
     OverOpaque, Probe, Promises, Site, Transparent, colour, over_opaque,
 };
+use screendoor_trace::error::Result;
+use screendoor_trace::param::Values;
 use screendoor_trace::trace::Fragment;
 
 /// The design's entry in the registry.

@@ -1,15 +1,15 @@
 //! The k-buffer (Bavoil, Callahan, Lefohn, Comba, Silva, I3D 2007): the nearest
 //! layers are kept in the order of their depths, what lies behind them is dropped.
 
-use screendoor_trace::error::Result;
-use screendoor_trace::param::Values;
 use screendoor_rop::layers::{COVERAGE, LAYERS, Layer, Layering, contents};
+use screendoor_rop::shader;
 use screendoor_rop::{
     Blueprint, Contents, Declaration, Family, Frame, Info, Layout, OnDevice, OpaquePromise,
     OrderPromise, OverOpaque, PixelWords, Port, Probe, Promises, Site, Transparent, colour,
     over_opaque,
 };
-use screendoor_rop::shader;
+use screendoor_trace::error::Result;
+use screendoor_trace::param::Values;
 use screendoor_trace::trace::Fragment;
 
 /// The design's entry in the registry.

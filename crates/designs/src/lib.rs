@@ -41,9 +41,9 @@ pub use wboit::WeightedBlended;
 
 pub use entry::{Configured, Entry};
 
+use screendoor_rop::Blueprint;
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::param::parse_spec;
-use screendoor_rop::Blueprint;
 
 /// All designs. A static: a constant would be compiled anew, for every sample count,
 /// into each crate that names it.

@@ -3,13 +3,13 @@
 //! the powers of its depth; a second weighs each fragment by the transmittance before
 //! it that these moments tell.
 
-use screendoor_trace::error::Result;
-use screendoor_trace::param::{Param, Values};
 use screendoor_rop::{
     Accumulators, Blueprint, ColourStore, Contents, Coverage, Family, Frame, Info, Layout,
     MomentCount, Moments, OpaquePromise, OrderPromise, OverOpaque, Probe, Promises, Site,
     Transparent, ViewDepth, accumulators, colour, over_opaque, view_depth,
 };
+use screendoor_trace::error::Result;
+use screendoor_trace::param::{Param, Values};
 use screendoor_trace::trace::Fragment;
 
 /// The design's entry in the registry.

@@ -1,15 +1,15 @@
 //! Multi-layer alpha blending (Salvi, Vaidyanathan, I3D 2014): layers in the order
 //! of their depths; where there is one too many, the last two are merged.
 
-use screendoor_trace::error::Result;
-use screendoor_trace::param::Values;
 use screendoor_rop::layers::{COVERAGE, LAYERS, Layer, Layering, contents};
+use screendoor_rop::shader;
 use screendoor_rop::{
     Blueprint, Contents, Declaration, Family, Frame, Info, Layout, OnDevice, OpaquePromise,
     OrderPromise, OverOpaque, PixelWords, Port, Probe, Promises, Site, Transparent, colour,
     over_opaque,
 };
-use screendoor_rop::shader;
+use screendoor_trace::error::Result;
+use screendoor_trace::param::Values;
 use screendoor_trace::trace::Fragment;
 
 /// The design's entry in the registry.

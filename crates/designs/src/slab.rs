@@ -33,20 +33,20 @@
 //!   (where samples are covered alike) and hidden ones removed, and with `weigh=true`
 //!   where no layer is dropped.
 
-use screendoor_trace::error::Result;
-use screendoor_trace::param::{Param, Values};
-use screendoor_trace::random::hash;
 use screendoor_rop::layers::{
     self, COVERAGE, Columns, Coverage, DEPTH_BITS, Deep, LAYERS, Layer, composite, contents,
     nearer, room,
 };
+use screendoor_rop::shader;
 use screendoor_rop::{
     Blueprint, Contents, Declaration, Family, Frame, Info, Layout, Normalise, OnDevice,
     OpaquePromise, OrderPromise, OverOpaque, PixelWords, Port, Probe, Promises, Site, Sums,
     Threshold, Transparent, colour, over_opaque, random_subset, visible_independent,
     visible_stratified,
 };
-use screendoor_rop::shader;
+use screendoor_trace::error::Result;
+use screendoor_trace::param::{Param, Values};
+use screendoor_trace::random::hash;
 use screendoor_trace::trace::{Fragment, SampleMask, Unorm32};
 
 screendoor_trace::options! {

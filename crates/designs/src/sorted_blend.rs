@@ -11,13 +11,13 @@
 use std::cmp::Reverse;
 use std::sync::Arc;
 
-use screendoor_trace::error::Result;
-use screendoor_trace::param::Values;
 use screendoor_rop::{
     BlendBuffer, Blueprint, ColourStore, Contents, Family, Frame, Info, Layout, NoProbe, Opaque,
     OpaquePromise, OrderPromise, OverOpaque, PrimitiveDepths, Probe, Promises, Site, Transparent,
 };
 use screendoor_rop::{colour, over_opaque};
+use screendoor_trace::error::Result;
+use screendoor_trace::param::Values;
 use screendoor_trace::trace::{Fragment, SampleMask};
 
 /// The design's entry in the registry.

@@ -8,12 +8,11 @@
 
 use fearless_simd::{Level, Simd};
 
-use screendoor_trace::error::Result;
-use screendoor_trace::param::{Param, Values};
 use screendoor_rop::fast::{
     Base, Count, FastEngine, FastReferences, FastTracked, Given, Lanes, Limit, Loaded, Numbered,
     Published, Tally, Width, below, is_published,
 };
+use screendoor_rop::shader;
 use screendoor_rop::stochastic::{self, COMBINATIONS, METHOD, OPAQUE, ROUNDS, STRATA};
 use screendoor_rop::tracked::{
     COMPACT, PIXEL_ORDER, PREHASH, REFERENCE, References, SORT, SURFACES, SampleOf, TRACK,
@@ -24,7 +23,8 @@ use screendoor_rop::{
     OrderPromise, PixelWords, Port, Probe, Promise, Promises, Reference, ReferenceKey, Round, Site,
     Stochastic, colour, depth_bits,
 };
-use screendoor_rop::shader;
+use screendoor_trace::error::Result;
+use screendoor_trace::param::{Param, Values};
 
 screendoor_trace::options! {
     /// What the place of a sample in its surface is counted in.
@@ -312,8 +312,8 @@ fn first(base: Base) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use screendoor_trace::random::Stream;
     use screendoor_rop::{PixelIndex, Threshold};
+    use screendoor_trace::random::Stream;
 
     /// Which of a surface's samples pass, their alphas given fragment by fragment.
     fn passes(phase: Phase, seed: u32, fragments: &[(f32, usize)]) -> Vec<bool> {

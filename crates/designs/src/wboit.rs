@@ -2,14 +2,14 @@
 //! 2013): the mean of all fragments, weighted by a guess from depth and alpha of how
 //! much of each is seen, over the background by the exact transmittance.
 
-use screendoor_trace::error::Result;
-use screendoor_trace::param::{Param, Values};
+use screendoor_rop::shader;
 use screendoor_rop::{
     Accumulators, Blueprint, ColourStore, Contents, Coverage, Declaration, Family, Frame, Info,
     Layout, OnDevice, OpaquePromise, OrderPromise, OverOpaque, PixelWords, Port, Probe, Promises,
     Site, Transparent, ViewDepth, accumulators, colour, over_opaque, view_depth,
 };
-use screendoor_rop::shader;
+use screendoor_trace::error::Result;
+use screendoor_trace::param::{Param, Values};
 use screendoor_trace::trace::{Fragment, Unorm32};
 
 screendoor_trace::options! {

@@ -1,12 +1,12 @@
 //! Sorting a chunk's rows by pixel, on the device.
 
-use screendoor_trace::error::Result;
 use crate::chunk::Uploaded;
 use crate::device::{Access, Gpu};
 use crate::params::Params;
 use crate::shader;
 use crate::time::Timer;
 use screendoor_rop::Constant;
+use screendoor_trace::error::Result;
 use screendoor_trace::tile::TILE_PIXELS;
 
 /// Bits of a digit; `DIGITS` in `shaders/bin.wgsl` is the number of its values.

@@ -3,10 +3,10 @@
 
 use std::ops::Range;
 
-use screendoor_trace::error::Result;
 use crate::device::Gpu;
 use crate::params::{Column, Params, words};
 use screendoor_rop::Constant;
+use screendoor_trace::error::Result;
 use screendoor_trace::trace::{ColumnId, Scalar, Trace, ValueType};
 
 /// Rows of a batch.

@@ -7,16 +7,16 @@ use std::time::Instant;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use screendoor_designs::Configured;
-use screendoor_trace::error::Result;
 use crate::bin::{Binner, Scratch, Sorted, uniform};
 use crate::chunk::{Chunks, Uploaded};
 use crate::device::{Access, Gpu, most_bytes};
 use crate::params::Params;
 use crate::shader;
 use crate::time::Timer;
-use screendoor_trace::picture::{Picture, TilePixels};
+use screendoor_designs::Configured;
 use screendoor_rop::{Constant, Frame, Port, Replayed, Shader, TileState, TileWords};
+use screendoor_trace::error::Result;
+use screendoor_trace::picture::{Picture, TilePixels};
 use screendoor_trace::tile::{TILE_PIXELS, TileId, TileMap};
 use screendoor_trace::trace::Trace;
 

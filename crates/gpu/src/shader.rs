@@ -3,8 +3,8 @@
 
 use std::fmt::Write;
 
-use screendoor_rop::{Constant, SHADERS, Shader};
 use screendoor_rop::shader;
+use screendoor_rop::{Constant, SHADERS, Shader};
 
 /// The device's own.
 pub(super) const OWN: &[Shader] = &[

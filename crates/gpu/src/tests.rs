@@ -10,9 +10,9 @@ use super::shader::defect::{self, Defect};
 use super::shader::{self, OWN};
 use super::{GpuOptions, GpuRun, Threads};
 use screendoor_designs::{Configured, DESIGNS, configure};
+use screendoor_rop::{Constant, Contents, SHADERS, Which};
 use screendoor_trace::param::Kind;
 use screendoor_trace::random::Stream;
-use screendoor_rop::{Constant, Contents, SHADERS, Which};
 use screendoor_trace::trace::{
     ColourFormat, ColumnId, DepthPlane, Fragment, Header, SampleMask, SamplePattern, Trace,
     TraceWriter, Unorm32, WriteOptions,

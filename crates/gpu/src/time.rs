@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
-use screendoor_trace::error::Result;
 use crate::device::Gpu;
+use screendoor_trace::error::Result;
 
 /// Passes that are timed, at most; wgpu allows a set twice as many queries.
 const MOST: u32 = 2048;

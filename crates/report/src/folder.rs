@@ -6,18 +6,18 @@ use std::time::SystemTime;
 use rayon::prelude::*;
 use serde_json::Value;
 
-use screendoor_trace::error::{Error, Result};
-use screendoor_study::metrics::{Estimate, Flip, FlipMap};
-use screendoor_trace::output::OutputFile;
-use screendoor_trace::param::Options;
-use screendoor_trace::picture::{Picture, read};
 use crate::export;
 use crate::html::viewer::{self, ViewedPicture, ViewedScene};
 use crate::html::{DesignText, Extras, Place, Section, page, replay_command, verification};
 use crate::results::Against;
+use screendoor_study::metrics::{Estimate, Flip, FlipMap};
 use screendoor_study::study::record::Record;
 use screendoor_study::study::results::{Results, SceneFacts};
 use screendoor_study::study::run::{Store, read_json};
+use screendoor_trace::error::{Error, Result};
+use screendoor_trace::output::OutputFile;
+use screendoor_trace::param::Options;
+use screendoor_trace::picture::{Picture, read};
 
 /// The page's file in the folder.
 pub const PAGE: &str = "report.html";

@@ -126,7 +126,7 @@ pub fn one_line(text: impl Display) -> String {
 }
 
 /// What a panic said, in one line.
-pub(crate) fn panic_text(panic: &(dyn Any + Send)) -> String {
+pub fn panic_text(panic: &(dyn Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().copied();
     let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
     one_line(text.unwrap_or("no reason is given"))

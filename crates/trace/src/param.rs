@@ -7,6 +7,8 @@
 use std::collections::BTreeMap;
 use std::fmt;
 
+#[doc(hidden)]
+pub use serde;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
@@ -173,17 +175,17 @@ macro_rules! options {
             const ALL: &'static [Self] = &[$($name::$variant),+];
         }
 
-        impl serde::Serialize for $name {
-            fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        impl $crate::param::serde::Serialize for $name {
+            fn serialize<S: $crate::param::serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
                 serializer.serialize_str(match self { $($name::$variant => $text),+ })
             }
         }
 
-        impl<'de> serde::Deserialize<'de> for $name {
-            fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-                match <String as serde::Deserialize>::deserialize(deserializer)?.as_str() {
+        impl<'de> $crate::param::serde::Deserialize<'de> for $name {
+            fn deserialize<D: $crate::param::serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                match <String as $crate::param::serde::Deserialize>::deserialize(deserializer)?.as_str() {
                     $($text => Ok($name::$variant),)+
-                    other => Err(<D::Error as serde::de::Error>::unknown_variant(other, &[$($text),+])),
+                    other => Err(<D::Error as $crate::param::serde::de::Error>::unknown_variant(other, &[$($text),+])),
                 }
             }
         }

@@ -3,11 +3,11 @@
 use fearless_simd::Simd;
 
 use crate::enderton::{Among, EndertonSampler, MaskRule, Words};
-use screendoor_trace::random::{GOLDEN, MIX, hash};
 use screendoor_rop::fast::{
     FastSampler, Lanes, Loaded, Offered, Tally, below, picked, ranks_of_distinct,
 };
 use screendoor_rop::{Probe, Round};
+use screendoor_trace::random::{GOLDEN, MIX, hash};
 use screendoor_trace::tile::{TILE_PIXELS, TileGrid, TileId};
 use screendoor_trace::trace::MAX_SAMPLES;
 

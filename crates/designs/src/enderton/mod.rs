@@ -6,17 +6,17 @@ use arrayvec::ArrayVec;
 use fearless_simd::Level;
 
 use crate::enderton::fast::FastEnderton;
-use screendoor_trace::error::Result;
-use screendoor_trace::param::{Param, Values};
-use screendoor_trace::random::hash;
 use screendoor_rop::fast::{Count, FastEngine, Width};
+use screendoor_rop::shader;
 use screendoor_rop::stochastic::{self, COMBINATIONS, METHOD, OPAQUE, ROUNDS, STRATA};
 use screendoor_rop::{
     Blueprint, Declaration, Dither, Engine, Family, Frame, Info, OnDevice, OpaquePromise,
     OrderPromise, PixelOrder, PixelWords, Port, Probe, Promise, Promises, Reference, ReferenceKey,
     Round, Sampler, Site, Stochastic, Threshold, colour, depth_bits, random_subset, stratified,
 };
-use screendoor_rop::shader;
+use screendoor_trace::error::Result;
+use screendoor_trace::param::{Param, Values};
+use screendoor_trace::random::hash;
 use screendoor_trace::tile::TileGrid;
 use screendoor_trace::trace::{Fragment, MAX_SAMPLES, SampleMask, Unorm32};
 

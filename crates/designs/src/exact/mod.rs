@@ -7,13 +7,13 @@ mod order;
 use fearless_simd::Level;
 
 use crate::exact::fast::Fast;
-use screendoor_trace::error::Result;
-use screendoor_trace::param::Values;
 use screendoor_rop::fast::{Count, Width};
 use screendoor_rop::{
     Blueprint, Contents, Design, Engine, Family, Frame, Info, Layout, OpaquePromise, OrderPromise,
     Probe, Promise, Promises, Site,
 };
+use screendoor_trace::error::Result;
+use screendoor_trace::param::Values;
 use screendoor_trace::trace::{DepthPlane, Fragment, SampleMask};
 
 /// The design's entry in the registry.

@@ -2,9 +2,9 @@
 
 use crate::exact::fast::Fast;
 use crate::{REFERENCE, configure};
-use screendoor_trace::random::Stream;
 use screendoor_rop::fast::levels;
 use screendoor_rop::{Engine, EventCounts, Frame, TileState, Told, Which};
+use screendoor_trace::random::Stream;
 use screendoor_trace::tile::{TILE_PIXELS, TileGrid, TileId};
 use screendoor_trace::trace::{Block, DepthPlane, Fragment, SampleMask, Unorm32};
 

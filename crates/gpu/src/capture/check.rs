@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use screendoor_scene::capture::SetUp;
 use crate::capture::fragments::RawFragment;
+use screendoor_scene::capture::SetUp;
 use screendoor_trace::trace::{DepthPlane, SampleMask};
 
 /// Why a sample is covered for one rasteriser and not for the other, as far as its place

@@ -4,8 +4,8 @@ use std::fmt::Display;
 
 use bytemuck::{Pod, Zeroable};
 
-use screendoor_trace::error::{Error, Result};
 use crate::device::most_bytes;
+use screendoor_trace::error::{Error, Result};
 use screendoor_trace::trace::{DepthPlane, Fragment, SampleMask, Unorm32};
 
 /// What a shader that records fragments begins with: `captured_depth` and

@@ -1,9 +1,9 @@
 //! Where an adapter's samples lie, found by drawing.
 
-use screendoor_scene::capture::{PatternKind, pattern};
-use screendoor_trace::error::Result;
 use crate::capture::rasteriser::{Corner, Rasteriser, SAMPLES};
 use crate::device::Gpu;
+use screendoor_scene::capture::{PatternKind, pattern};
+use screendoor_trace::error::Result;
 use screendoor_trace::trace::SamplePattern;
 
 /// Places along an axis: sixteenths of a pixel.

@@ -5,10 +5,10 @@ use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 
-use screendoor_trace::error::Result;
 use crate::capture::fragments::{Captured, FragmentBuffer, RawFragment};
 use crate::device::Gpu;
 use crate::shader;
+use screendoor_trace::error::Result;
 
 /// Samples of a pixel: the one count above 1 that every adapter has.
 pub(super) const SAMPLES: u32 = 4;

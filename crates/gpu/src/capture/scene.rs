@@ -5,15 +5,17 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use screendoor_scene::capture::{Capture, CaptureOptions, Drawing, PatternKind, Unseen};
-use screendoor_trace::error::{Error, Result};
 use crate::capture::check::CrossCheck;
 use crate::capture::fragments::RawFragment;
 use crate::capture::positions::sample_positions;
 use crate::capture::rasteriser::{Corner, Rasteriser, SAMPLES};
 use crate::device::Gpu;
+use screendoor_scene::capture::{Capture, CaptureOptions, Drawing, PatternKind, Unseen};
 use screendoor_scene::scene::Scene;
-use screendoor_trace::trace::{Fragment, Header, SampleMask, SamplePattern, Trace, TraceWriter, WriteOptions};
+use screendoor_trace::error::{Error, Result};
+use screendoor_trace::trace::{
+    Fragment, Header, SampleMask, SamplePattern, Trace, TraceWriter, WriteOptions,
+};
 
 /// Triangles sent at a time.
 const CHUNK: usize = 1 << 14;

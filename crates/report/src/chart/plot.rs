@@ -2,9 +2,9 @@
 
 use maud::{Markup, html};
 
-use screendoor_study::metrics::Estimate;
 use crate::chart::labels::{Wanted, column, place};
 use crate::chart::{Kind, Scale, Style, px};
+use screendoor_study::metrics::Estimate;
 use screendoor_study::study::record::Kept;
 use screendoor_study::study::throughput::Spread;
 

@@ -1,8 +1,8 @@
 //! Results as Markdown: for people, and for notes and issues.
 
-use screendoor_study::metrics::Estimate;
 use crate::html::words::{counted, figures, fixed};
 use crate::markdown_table;
+use screendoor_study::metrics::Estimate;
 use screendoor_study::study::record::Record;
 use screendoor_study::study::results::{Missing, Results};
 

@@ -2,13 +2,13 @@
 
 use maud::{Markup, html};
 
-use screendoor_trace::param::Options;
 use crate::html::page::{Place, given_within};
 use crate::html::parts::{Cell, Content, command, figure, rounded, table};
 use crate::html::words::{figures, fixed, grouped, quoted};
 use screendoor_study::study::analysis::{Cost, ROUNDING, baseline};
 use screendoor_study::study::record::Promise;
 use screendoor_study::study::record::Record;
+use screendoor_trace::param::Options;
 
 pub(super) fn designs(content: &Content<'_>) -> Markup {
     html! {

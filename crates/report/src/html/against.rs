@@ -2,11 +2,11 @@
 
 use maud::{Markup, html};
 
-use screendoor_trace::param::Options;
 use crate::chart::{Axis, Curve, Kind, Mark, Names, Plot};
 use crate::html::parts::{Content, figure, nothing, tabs};
 use crate::html::words::{counted, estimated, figures, listed};
 use screendoor_study::study::analysis::{Cost, Point, Points, baseline, points};
+use screendoor_trace::param::Options;
 
 /// The chart over all scenes, with a panel for each cost.
 pub(super) fn central(content: &Content<'_>) -> Markup {

@@ -2,7 +2,6 @@
 
 use maud::{Markup, html};
 
-use screendoor_trace::param::Options;
 use crate::html::against;
 use crate::html::page::Extras;
 use crate::html::parts::{Cell, Content, figure, name};
@@ -11,6 +10,7 @@ use screendoor_study::study::analysis::{
     Answer, BUDGETS, Budget, Candidate, Need, RunName, Separation, answers, baseline, relative,
 };
 use screendoor_study::study::results::Results;
+use screendoor_trace::param::Options;
 
 pub(super) fn section(content: &Content<'_>) -> Markup {
     let answers = answers(content.results);

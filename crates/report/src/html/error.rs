@@ -2,11 +2,11 @@
 
 use maud::{Markup, html};
 
-use screendoor_study::metrics::Estimate;
 use crate::chart::{Bar, Kind, Row, Rows, Segment, swatch};
 use crate::html::choice::share_cell;
 use crate::html::parts::{Cell, Content, figure, nothing, table};
 use crate::html::words::{estimated, figures, fixed};
+use screendoor_study::metrics::Estimate;
 use screendoor_study::study::analysis::baseline;
 use screendoor_study::study::record::Record;
 

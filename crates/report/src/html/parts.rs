@@ -2,10 +2,10 @@
 
 use maud::{Markup, html};
 
-use screendoor_study::metrics::Estimate;
 use crate::chart::{Styles, key};
 use crate::html::page::Extras;
 use crate::html::words::{figures, fixed, quoted};
+use screendoor_study::metrics::Estimate;
 use screendoor_study::study::analysis::reference_count;
 use screendoor_study::study::record::Record;
 use screendoor_study::study::results::Results;

@@ -2,11 +2,11 @@
 
 use maud::{Markup, html};
 
-use screendoor_study::metrics::Estimate;
 use crate::chart::{Axis, Bar, Curve, Kind, Mark, Names, Plot, Row, Rows, swatch};
 use crate::html::page::{Place, given_within};
 use crate::html::parts::{Cell, Content, figure, nothing, table};
 use crate::html::words::{estimated, figures, fixed};
+use screendoor_study::metrics::Estimate;
 use screendoor_study::study::record::{FlipOverSeeds, Record};
 use screendoor_study::study::throughput::Spread;
 

@@ -4,11 +4,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::*;
-use screendoor_trace::param::Options;
 use screendoor_study::study::analysis::made_up::plausible;
 use screendoor_study::study::analysis::{Cost, RunName, reference_count, relative};
 use screendoor_study::study::record::Record;
 use screendoor_study::study::results::Results;
+use screendoor_trace::param::Options;
 
 fn extras() -> Extras {
     Extras { when: Some("2026-01-02".into()), ..Extras::default() }

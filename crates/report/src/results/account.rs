@@ -2,13 +2,15 @@
 
 use std::fmt::Write;
 
-use screendoor_study::metrics::Estimate;
 use crate::markdown_table;
 use crate::results::against::above;
 use crate::results::ratio;
 use crate::results::ratios::{Holding, OnScenes, holding};
 use crate::results::table_1::runs;
-use screendoor_study::study::publications::{Aspect, COUNTS, Order, Publications, Published, Variation};
+use screendoor_study::metrics::Estimate;
+use screendoor_study::study::publications::{
+    Aspect, COUNTS, Order, Publications, Published, Variation,
+};
 
 /// The account; what was not measured is left out.
 pub(super) fn text(text: &mut String, p: &Publications) {

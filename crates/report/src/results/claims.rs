@@ -3,11 +3,11 @@
 
 use std::fmt::Write;
 
-use screendoor_study::metrics::{Estimate, student_t};
 use crate::markdown_table;
 use crate::results::against::{Against, Agreement, above, below};
 use crate::results::ratios::{Holding, OnScenes, holding};
 use crate::results::{plain, ratio};
+use screendoor_study::metrics::{Estimate, student_t};
 use screendoor_study::study::publications::claims::{
     BLOCK, Claims, DITHERED, HASH_ROUNDS, STRATIFIED, TABLE, Trial, Variant,
 };

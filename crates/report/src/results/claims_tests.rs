@@ -11,12 +11,7 @@ fn known(value: f64) -> Estimate {
 }
 
 /// A variant with an RMSE, the same over blocks, and a mean error.
-pub(in crate::results) fn variant(
-    design: &str,
-    rmse: f64,
-    blocks: f64,
-    mean: f64,
-) -> Variant {
+pub(in crate::results) fn variant(design: &str, rmse: f64, blocks: f64, mean: f64) -> Variant {
     let errors = EnsembleErrors {
         seeds: 4,
         pixels: 1000,

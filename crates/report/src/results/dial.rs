@@ -2,15 +2,17 @@
 
 use std::fmt::Write;
 
-use screendoor_study::metrics::Estimate;
 use crate::chart::{Axis, Curve, Kind, Mark, Names, Plot, Styles, alone};
 use crate::markdown_table;
 use crate::results::Drawn;
 use crate::results::against::{Against, Agreement};
 use crate::results::claims::{RMSE, SAME, frames, ratios};
 use crate::results::ratios::{Holding, holding};
+use screendoor_study::metrics::Estimate;
 use screendoor_study::study::comparison::SLAB_LAYERS;
-use screendoor_study::study::publications::claims::{DIAL, DISCRETE, ENDS, Trial, TriedScene, dialled};
+use screendoor_study::study::publications::claims::{
+    DIAL, DISCRETE, ENDS, Trial, TriedScene, dialled,
+};
 use screendoor_study::study::throughput::Spread;
 
 /// Errors below this, in 8-bit units, are rounding.

@@ -2,10 +2,10 @@
 
 use std::fmt::Write;
 
-use screendoor_study::metrics::student_t;
 use crate::markdown_table;
 use crate::results::plain;
 use crate::results::ratios::{Holding, holding};
+use screendoor_study::metrics::student_t;
 use screendoor_study::study::publications::{DESIGNS, MIXED, MeanError, Publications};
 
 /// The section; nothing where no expectations were measured.

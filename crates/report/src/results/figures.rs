@@ -2,10 +2,10 @@
 
 use std::fmt::Write;
 
-use screendoor_trace::picture::Picture;
 use crate::results::Drawn;
 use crate::{Panel, montage};
 use screendoor_study::study::publications::{NamedPicture, Publications};
+use screendoor_trace::picture::Picture;
 
 /// A figure of the document: its file and what it is made of.
 #[derive(Clone, Copy, Debug)]

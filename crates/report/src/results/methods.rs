@@ -2,10 +2,10 @@
 
 use std::fmt::Write;
 
-use screendoor_study::metrics::Estimate;
 use crate::markdown_table;
 use crate::results::against::{Against, Agreement, above};
 use crate::results::{plain, ratio};
+use screendoor_study::metrics::Estimate;
 use screendoor_study::study::publications::hashes::TRIES;
 use screendoor_study::study::publications::methods::{Figure8, MOST_BITS, Methods, TABLE_BITS};
 use screendoor_study::study::publications::{COUNTS, Published};

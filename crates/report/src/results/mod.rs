@@ -22,16 +22,16 @@ pub use against::{Against, Agreement};
 pub use figures::{FIGURES, Figure};
 pub use summary::{check_marks, in_short};
 
-use screendoor_trace::error::Result;
-use screendoor_study::metrics::Estimate;
-use screendoor_trace::output::OutputFile;
-use screendoor_trace::param::Options;
-use screendoor_trace::picture::{Picture, write_png};
 use crate::{markdown_table, stability};
+use screendoor_study::metrics::Estimate;
 use screendoor_study::study::comparison::Comparison;
 use screendoor_study::study::file::Publication;
 use screendoor_study::study::publications::methods::Methods;
 use screendoor_study::study::publications::{Publications, Reproduced, RowDifference};
+use screendoor_trace::error::Result;
+use screendoor_trace::output::OutputFile;
+use screendoor_trace::param::Options;
+use screendoor_trace::picture::{Picture, write_png};
 
 /// A publication's figures beside ours.
 #[derive(Clone, Debug)]

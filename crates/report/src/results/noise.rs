@@ -2,11 +2,11 @@
 
 use std::fmt::Write;
 
-use screendoor_study::metrics::Estimate;
 use crate::markdown_table;
 use crate::results::against::{Against, Agreement, above, below};
 use crate::results::figures::show;
 use crate::results::plain;
+use screendoor_study::metrics::Estimate;
 use screendoor_study::study::publications::{
     BLOCKS, CORRELATION_SEEDS, EdgeNoise, FarSamples, Noise, Publications,
 };

@@ -1,8 +1,8 @@
 //! A ratio on every scene, and on which of them a rule holds: what a sentence about scenes
 //! is made of.
 
-use screendoor_study::metrics::Estimate;
 use crate::results::against::{above, below};
+use screendoor_study::metrics::Estimate;
 
 /// A number on each of several scenes.
 #[derive(Clone, Debug, Default)]

@@ -3,8 +3,8 @@
 
 use std::fmt::Write;
 
-use screendoor_trace::error::{Error, Result};
 use crate::results::Against;
+use screendoor_trace::error::{Error, Result};
 
 /// The marks around what is in short, in RESULTS.md's parts and in README.md.
 const BEGIN: &str = "<!-- begin of the results in short, written by `screendoor reproduce` -->\n";

@@ -2,11 +2,11 @@
 
 use std::fmt::Write;
 
-use screendoor_study::metrics::Estimate;
 use crate::markdown_table;
 use crate::results::against::{Against, Agreement, above, below};
 use crate::results::ratios::OnScenes;
 use crate::results::{plain, ratio};
+use screendoor_study::metrics::Estimate;
 use screendoor_study::study::Run;
 use screendoor_study::study::publications::{COUNTS, DESIGNS, Publications, Published, Table1};
 

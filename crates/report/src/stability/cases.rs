@@ -3,13 +3,13 @@
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
-use screendoor_trace::param::Options;
 use crate::markdown_table;
 use crate::stability::{in_cell, short};
 use screendoor_study::study::record::Promise;
 use screendoor_study::study::stress::{
     DECIDED, Facts, Finding, Group, HEAVY_SEEDS, Outcome, SIGNIFICANCE, Series, Stability, Tally,
 };
+use screendoor_trace::param::Options;
 
 pub(super) fn text(text: &mut String, found: &Stability) {
     let [exact, within, undecided, degraded, not_finite, refused] =

@@ -3,7 +3,9 @@
 use std::fmt::Write;
 
 use crate::markdown_table;
-use screendoor_study::study::stress::{Between, Correlation, CorrelationRow, SIGNIFICANCE, Stability};
+use screendoor_study::study::stress::{
+    Between, Correlation, CorrelationRow, SIGNIFICANCE, Stability,
+};
 
 pub(super) fn text(text: &mut String, found: &Stability) {
     let promised = found.hashes.iter().filter(|h| h.promised);

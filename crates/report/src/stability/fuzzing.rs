@@ -4,9 +4,9 @@ use std::fmt::Write;
 
 use serde::Deserialize;
 
-use screendoor_trace::error::{Error, Result};
 use crate::markdown_table;
 use crate::stability::in_cell;
+use screendoor_trace::error::{Error, Result};
 
 const FIGURES: &str = include_str!("../../../../docs/fuzzing/figures.toml");
 const FOUND: &str = include_str!("../../../../docs/fuzzing/found.toml");

@@ -7,8 +7,8 @@ mod system;
 
 use std::fmt::Write;
 
-use screendoor_trace::error::Result;
 use screendoor_study::study::stress::Stability;
+use screendoor_trace::error::Result;
 
 /// The document; of what was not tried it says nothing.
 ///
@@ -73,7 +73,9 @@ fn in_cell(text: &str) -> String {
 mod tests {
     use super::*;
     use screendoor_study::study::record::Promise;
-    use screendoor_study::study::stress::{Agreement, Claim, Facts, Fault, Finding, Outcome, Series, cases};
+    use screendoor_study::study::stress::{
+        Agreement, Claim, Facts, Fault, Finding, Outcome, Series, cases,
+    };
 
     #[test]
     fn numbers_are_short() {

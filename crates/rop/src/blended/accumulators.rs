@@ -1,7 +1,7 @@
 //! Sums over a pixel's fragments, for each of its samples or for the pixel.
 
-use screendoor_trace::param::{Param, Values};
 use crate::resolve::box_filter;
+use screendoor_trace::param::{Param, Values};
 use screendoor_trace::trace::{Fragment, SampleMask};
 
 screendoor_trace::options! {

@@ -1,11 +1,11 @@
 //! Alpha blending into a multisample colour buffer, sample by sample.
 
-use crate::resolve::box_filter;
 use crate::contract::colour::ColourStore;
 use crate::contract::contents::Contents;
 use crate::contract::event::Probe;
 use crate::contract::layout::Layout;
 use crate::contract::over_opaque::Opaque;
+use crate::resolve::box_filter;
 use screendoor_trace::trace::SampleMask;
 
 /// What has been blended over the colours of a pixel's `N` samples, in their own buffer.

@@ -2,8 +2,6 @@
 
 use fearless_simd::Level;
 
-use screendoor_trace::error::Result;
-use screendoor_trace::param::Values;
 use crate::contract::design::Design;
 use crate::contract::engine::Engine;
 use crate::contract::frame::Frame;
@@ -11,6 +9,8 @@ use crate::contract::info::Info;
 use crate::contract::port::Port;
 use crate::contract::promises::Promises;
 use crate::lanes::{Count, Width};
+use screendoor_trace::error::Result;
+use screendoor_trace::param::Values;
 
 /// A design with its parameters still open: what the registry holds.
 pub trait Blueprint: 'static {

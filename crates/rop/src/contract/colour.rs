@@ -2,8 +2,8 @@
 
 use half::f16;
 
-use screendoor_trace::param::{Param, Values};
 use crate::contract::frame::Frame;
+use screendoor_trace::param::{Param, Values};
 
 screendoor_trace::options! {
     /// How wide a stored channel of a colour is.

@@ -3,12 +3,12 @@
 
 use std::any::Any;
 
-use screendoor_trace::picture::TilePixels;
 use crate::contract::contents::Contents;
 use crate::contract::design::Design;
 use crate::contract::event::{Event, EventCounts, Listen, NoProbe, Probe, Record};
 use crate::contract::frame::Site;
 use crate::contract::layout::{Layout, StateBits};
+use screendoor_trace::picture::TilePixels;
 use screendoor_trace::tile::{TILE_PIXELS, TileGrid, TileId};
 use screendoor_trace::trace::Block;
 

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use screendoor_trace::error::Result;
 use crate::contract::primitive_depths::PrimitiveDepths;
+use screendoor_trace::error::Result;
 use screendoor_trace::tile::TileGrid;
 use screendoor_trace::trace::{ColourFormat, Fragment, Trace, Unorm32};
 

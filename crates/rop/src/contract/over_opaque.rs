@@ -5,8 +5,6 @@
 //! z-buffer of their own, transparent ones are culled behind it, and the opaque
 //! picture is dimmed sample by sample.
 
-use screendoor_trace::param::{Param, Values};
-use crate::resolve::box_filter;
 use crate::contract::colour::ColourStore;
 use crate::contract::contents::Contents;
 use crate::contract::design::Design;
@@ -16,6 +14,8 @@ use crate::contract::layout::Layout;
 use crate::contract::promises::OpaquePromise;
 use crate::contract::samples::Samples;
 use crate::contract::words::{Constant, Declaration, OnDevice, PixelWords};
+use crate::resolve::box_filter;
+use screendoor_trace::param::{Param, Values};
 use screendoor_trace::trace::{Fragment, SampleMask, Unorm32};
 
 screendoor_trace::options! {

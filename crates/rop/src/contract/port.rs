@@ -6,12 +6,12 @@ use crate::contract::shader::Shader;
 use crate::contract::words::{Constant, Declaration, Field, OnDevice, PixelWords, TileWords};
 use std::fmt;
 
-use screendoor_trace::param::{Kind, Param, Value, Values};
 use crate::contract::design::Design;
 use crate::contract::engine::{Engine, TileState, sites};
 use crate::contract::frame::Frame;
 use crate::contract::info::Info;
 use crate::contract::words::Ranks;
+use screendoor_trace::param::{Kind, Param, Value, Values};
 use screendoor_trace::tile::{TileGrid, TileId};
 
 type Restore = dyn Fn(TileGrid, TileId, TileWords<'_>, &[Field]) -> TileState + Send + Sync;

@@ -6,13 +6,13 @@
 //! less-or-equal depth test has it. A pixel is resolved in columns: one for each
 //! sample, or a single one where coverage is but a share of alpha.
 
-use screendoor_trace::param::{Param, Values};
 use crate::contract::colour::ColourStore;
 use crate::contract::contents::Contents;
 use crate::contract::event::Probe;
 use crate::contract::frame::{Frame, Site};
 use crate::contract::layout::Layout;
 use crate::contract::words::{Declaration, OnDevice, PixelWords};
+use screendoor_trace::param::{Param, Values};
 use screendoor_trace::trace::{Fragment, SampleMask, Unorm32};
 
 /// Bits of a layer's depth.

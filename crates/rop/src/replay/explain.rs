@@ -2,12 +2,12 @@
 
 use std::collections::VecDeque;
 
-use screendoor_trace::error::{Error, Result};
 use crate::contract::contents::Contents;
 use crate::contract::design::Design;
 use crate::contract::engine::{Engine, Told};
 use crate::contract::event::{NoProbe, Record};
 use crate::contract::frame::{Frame, Site};
+use screendoor_trace::error::{Error, Result};
 use screendoor_trace::tile::TileGrid;
 use screendoor_trace::trace::{Block, Fragment, SampleMask, Trace};
 

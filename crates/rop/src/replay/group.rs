@@ -3,9 +3,9 @@
 
 use std::ops::Range;
 
-use screendoor_trace::error::{Error, Result};
 use crate::contract::frame::Frame;
 use crate::replay::options::ReplayOptions;
+use screendoor_trace::error::{Error, Result};
 use screendoor_trace::tile::{TILE_PIXELS, TileGrid, TileId};
 use screendoor_trace::trace::{SampleMask, Trace};
 

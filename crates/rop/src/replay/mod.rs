@@ -22,13 +22,13 @@ use rayon::prelude::*;
 pub use explain::{ExplainLimits, Explanation, Step, draw_pixel, explain};
 pub use options::{ReplayOptions, Which};
 
-use screendoor_trace::error::Result;
-use screendoor_trace::picture::{Picture, TilePixels};
 use crate::contract::event::EventCounts;
 use crate::contract::frame::Frame;
 use crate::contract::layout::{Layout, StateBits};
 use crate::replay::group::{Group, group_tiles};
 use crate::replay::window::{Window, Windows};
+use screendoor_trace::error::Result;
+use screendoor_trace::picture::{Picture, TilePixels};
 use screendoor_trace::tile::{TileId, TileMap};
 use screendoor_trace::trace::Trace;
 

@@ -2,9 +2,9 @@
 
 use fearless_simd::Level;
 
+use crate::lanes::levels;
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::param::Options;
-use crate::lanes::levels;
 
 screendoor_trace::options! {
     /// Which of a design's implementations draws; they give the same bits.

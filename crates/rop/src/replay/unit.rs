@@ -195,8 +195,8 @@ fn find_changes<S: Simd>(simd: S, columns: [&[u16]; 2], len: usize, mut at: impl
 #[cfg(test)]
 mod tests {
     use super::*;
-    use screendoor_trace::random::Stream;
     use crate::lanes::levels;
+    use screendoor_trace::random::Stream;
 
     /// Runs that end where a vector does, and elsewhere; one row or column for all.
     #[test]

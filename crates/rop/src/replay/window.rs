@@ -9,12 +9,12 @@ use std::sync::Mutex;
 use fearless_simd::Level;
 use rayon::prelude::*;
 
-use screendoor_trace::error::Result;
 use crate::contract::engine::{Engine, TileState, Told};
 use crate::contract::event::EventCounts;
 use crate::contract::frame::Frame;
 use crate::replay::group::Group;
 use crate::replay::unit::{Part, Sorter, Unit};
+use screendoor_trace::error::Result;
 use screendoor_trace::tile::{TileId, TileMap};
 use screendoor_trace::trace::{Block, SampleMask, Trace};
 

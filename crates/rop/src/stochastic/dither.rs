@@ -4,11 +4,11 @@
 use crate::contract::words::{Ranks, TILE};
 use std::sync::LazyLock;
 
-use screendoor_trace::random::hash;
 use crate::contract::frame::Site;
 use crate::stochastic::methods::Round;
 use crate::stochastic::pixel_order::PixelIndex;
 use crate::stochastic::reference_value::{Reference, ReferenceKey};
+use screendoor_trace::random::hash;
 
 screendoor_trace::options! {
     /// How ξ is spread over the pixels.

@@ -6,10 +6,6 @@
 //! opaque fragments are drawn first and apart, and what lies behind is dimmed
 //! sample by sample (section 3.5).
 
-use screendoor_trace::error::Result;
-use screendoor_trace::param::{Param, Values};
-use screendoor_trace::random::hash;
-use crate::resolve::box_filter;
 use crate::contract::colour::ColourStore;
 use crate::contract::contents::Contents;
 use crate::contract::event::Probe;
@@ -23,7 +19,11 @@ use crate::contract::promises::{OpaquePromise, OrderPromise, Promises};
 use crate::contract::samples::Samples;
 use crate::contract::shader::Shader;
 use crate::contract::words::{Constant, Declaration, OnDevice, PixelWords};
+use crate::resolve::box_filter;
 use crate::stochastic::depth_bits;
+use screendoor_trace::error::Result;
+use screendoor_trace::param::{Param, Values};
+use screendoor_trace::random::hash;
 use screendoor_trace::trace::{Fragment, SampleMask, Unorm32};
 
 screendoor_trace::options! {

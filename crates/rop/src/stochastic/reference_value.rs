@@ -1,8 +1,8 @@
 //! Opacity reference values (Laine and Karras 2011, section 3): nested uniform
 //! scrambles of the radical inverse, from one hash to the next better mixed.
 
-use screendoor_trace::random::{hash, mix, scatter};
 use crate::stochastic::pixel_order::PixelIndex;
+use screendoor_trace::random::{hash, mix, scatter};
 
 screendoor_trace::options! {
     /// How reference values are made.

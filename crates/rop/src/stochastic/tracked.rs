@@ -4,7 +4,6 @@
 //! This file is the only normative text of the algorithm; anything faster must
 //! give the same bits.
 
-use screendoor_trace::param::{Param, Values};
 use crate::contract::event::Probe;
 use crate::contract::frame::{Frame, Site};
 use crate::contract::opacity::Threshold;
@@ -14,6 +13,7 @@ use crate::stochastic::methods::{Round, Sampler};
 use crate::stochastic::pixel_order::{PixelIndex, PixelOrder};
 use crate::stochastic::reference_value::{Reference, ReferenceKey};
 use crate::stochastic::surface::{CoveredMask, SurfaceRule, SurfaceTracker, Tracked};
+use screendoor_trace::param::{Param, Values};
 use screendoor_trace::tile::TileGrid;
 use screendoor_trace::trace::{Fragment, SampleMask, Unorm32};
 

@@ -2,8 +2,8 @@
 
 use glam::{DMat4, DVec3, DVec4};
 
-use screendoor_trace::error::{Error, Result};
 use crate::scene::Scene;
+use screendoor_trace::error::{Error, Result};
 
 /// From where and how wide to look. What is not given follows the scene's own
 /// view, framed so that all of it shows.

@@ -10,7 +10,7 @@ use crate::capture::{Capture, Drawn, order};
 use screendoor_trace::trace::{DepthPlane, Fragment, SampleMask, SamplePattern};
 
 /// A capture's triangles in drawing order, for another rasteriser to draw.
-pub(crate) struct Drawing<'a> {
+pub struct Drawing<'a> {
     capture: &'a Capture<'a>,
     geometry: Geometry<'a>,
     shader: Shader<'a>,
@@ -18,7 +18,7 @@ pub(crate) struct Drawing<'a> {
 }
 
 /// A triangle of a [`Drawing`], set up on our grid.
-pub(crate) struct SetUp<'a> {
+pub struct SetUp<'a> {
     drawing: &'a Drawing<'a>,
     drawn: Drawn,
     /// The samples' places in sub-pixel steps from the pixel's centre.
@@ -27,7 +27,7 @@ pub(crate) struct SetUp<'a> {
 
 impl Capture<'_> {
     /// What it draws, for another rasteriser.
-    pub(crate) fn drawing(&self) -> Drawing<'_> {
+    pub fn drawing(&self) -> Drawing<'_> {
         let geometry = Geometry::new(self.scene, &self.camera);
         let (kind, seed) = (self.options.order, self.options.order_seed);
         let order = order::drawing_order(kind, seed, &geometry, &self.camera);
@@ -36,7 +36,7 @@ impl Capture<'_> {
     }
 
     /// Says that samples lie where `pattern` has them, and who found the coverage.
-    pub(crate) fn drawn_by(&mut self, rasteriser: &str, pattern: SamplePattern) {
+    pub fn drawn_by(&mut self, rasteriser: &str, pattern: SamplePattern) {
         self.header.pattern = pattern;
         self.header.source.push_str(&format!(", drawn by {rasteriser}"));
     }

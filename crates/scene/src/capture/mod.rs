@@ -21,7 +21,7 @@ use std::io::Write;
 use rayon::prelude::*;
 
 pub use camera::{Camera, CameraOptions};
-pub(crate) use covered::{Drawing, SetUp};
+pub use covered::{Drawing, SetUp};
 pub use order::Order;
 pub use pattern::{PatternKind, pattern};
 pub use unseen::Unseen;
@@ -31,8 +31,8 @@ use crate::capture::raster::Raster;
 use crate::capture::setup::{STEPS, ScreenTriangle, set_up};
 use crate::capture::shade::Shader;
 use crate::capture::unseen::Recorded;
-use screendoor_trace::error::{Error, Result};
 use crate::scene::Scene;
+use screendoor_trace::error::{Error, Result};
 use screendoor_trace::trace::{
     ColourFormat, ColumnId, Fragment, Header, Scalar, Trace, TraceWriter, WriteOptions,
 };
@@ -235,11 +235,7 @@ impl<'a> Capture<'a> {
     }
 
     /// Writes a fragment, and notes that its object has one.
-    pub(crate) fn write<W: Write>(
-        &self,
-        writer: &mut TraceWriter<W>,
-        fragment: &Fragment,
-    ) -> Result<()> {
+    pub fn write<W: Write>(&self, writer: &mut TraceWriter<W>, fragment: &Fragment) -> Result<()> {
         self.recorded.mark(fragment.object);
         writer.push(fragment)
     }

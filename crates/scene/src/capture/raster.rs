@@ -274,8 +274,8 @@ mod tests {
     use super::*;
     use crate::capture::pattern::{PatternKind, pattern};
     use crate::capture::setup::cross;
-    use screendoor_trace::random::Stream;
     use glam::DVec3;
+    use screendoor_trace::random::Stream;
 
     fn offsets(samples: u32) -> Vec<[i64; 2]> {
         let pattern = pattern(PatternKind::Auto, samples).unwrap();

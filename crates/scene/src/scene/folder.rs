@@ -19,8 +19,8 @@ use std::rc::Rc;
 use cap_std::ambient_authority;
 use cap_std::fs::{Dir, OpenOptions};
 
-use screendoor_trace::error::{Error, Result, one_line};
 use crate::scene::{Scene, file, file_name};
+use screendoor_trace::error::{Error, Result, one_line};
 
 /// How deep below the folder names are looked for.
 const MAX_DEPTH: usize = 4;

@@ -31,9 +31,9 @@ pub use material::{AlphaMode, Material, TextureUse};
 pub use sampling::{Filter, Sampling, Wrap};
 pub use texture::Texture;
 
-use screendoor_trace::error::{Error, Result};
 use crate::scene::folder::Folder;
 use crate::scene::source::{BUILTIN, ending, no_builtin, no_scene};
+use screendoor_trace::error::{Error, Result};
 
 /// The most texels of all textures of a scene that were read from files: 11 bytes
 /// each when loaded.

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use screendoor_trace::error::{Error, Result, nearest};
 use crate::scene::builtin;
+use screendoor_trace::error::{Error, Result, nearest};
 
 /// How a built-in scene's name begins.
 pub(super) const BUILTIN: &str = "builtin:";

@@ -5,11 +5,11 @@ use std::path::Path;
 use glam::{Vec2, Vec4};
 use image::DynamicImage;
 
-use screendoor_trace::error::Result;
-use screendoor_trace::picture::srgb;
 use crate::scene::file;
 use crate::scene::image_file::{self, MAX_SIDE, is_deep};
 use crate::scene::sampling::{Filter, Sampling, Wrap};
+use screendoor_trace::error::Result;
+use screendoor_trace::picture::srgb;
 
 /// What the numbers of an image file mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -8,10 +8,10 @@ use std::path::Path;
 
 use glam::{Vec3, Vec4};
 
-use screendoor_trace::error::{Error, Result};
-use screendoor_trace::random::Stream;
 use crate::scene::bytes::Bytes;
 use crate::scene::{Material, Scene, Shape, Strands, View, file, file_name};
+use screendoor_trace::error::{Error, Result};
+use screendoor_trace::random::Stream;
 
 /// The file says nothing of these: brown, half see-through.
 const COLOUR: [f32; 3] = [0.22, 0.10, 0.045];

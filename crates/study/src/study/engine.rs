@@ -4,10 +4,10 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use screendoor_designs::Configured;
-use screendoor_trace::error::{Error, Result};
 use screendoor_gpu::{self as gpu, Adapter, Gpu, GpuOptions, GpuSeconds, Threads};
-use screendoor_trace::param::{Choice, Options};
 use screendoor_rop::{ReplayOptions, Replayed, Which};
+use screendoor_trace::error::{Error, Result};
+use screendoor_trace::param::{Choice, Options};
 use screendoor_trace::trace::Trace;
 
 /// An engine by its name.

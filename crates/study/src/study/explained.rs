@@ -3,9 +3,9 @@
 use serde::Serialize;
 
 use screendoor_designs::Configured;
+use screendoor_rop::{ExplainLimits, Explanation, Site};
 use screendoor_trace::error::Result;
 use screendoor_trace::param::Values;
-use screendoor_rop::{ExplainLimits, Explanation, Site};
 use screendoor_trace::trace::Trace;
 
 /// What a design does at one pixel, with all that names the run: what

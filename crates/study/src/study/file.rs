@@ -5,12 +5,14 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use screendoor_scene::capture::{CameraOptions, CaptureOptions, Faces, Order, PatternKind, pattern};
+use crate::study::engine::EngineName;
 use screendoor_designs::{Configured, configure};
+use screendoor_rop::ReplayOptions;
+use screendoor_scene::capture::{
+    CameraOptions, CaptureOptions, Faces, Order, PatternKind, pattern,
+};
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::param::Options;
-use screendoor_rop::ReplayOptions;
-use crate::study::engine::EngineName;
 use screendoor_trace::trace::{MAX_SIDE, SamplePattern};
 
 screendoor_trace::options! {

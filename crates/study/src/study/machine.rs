@@ -1,7 +1,7 @@
 //! What measures.
 
-use screendoor_rop::fast::levels;
 use crate::study::results::Machine;
+use screendoor_rop::fast::levels;
 
 impl Machine {
     /// This machine. `gpu` is the GPU that is used, if one is.

@@ -18,11 +18,11 @@ use std::time::Instant;
 use serde::Serialize;
 use statrs::statistics::{Data, OrderStatistics};
 
-use screendoor_designs::{Configured, REFERENCE, configure};
-use screendoor_trace::error::Result;
 use crate::metrics::{Ensemble, EnsembleErrors, Estimate, PixelClasses, Region, errors};
-use screendoor_trace::picture::Picture;
+use screendoor_designs::{Configured, REFERENCE, configure};
 use screendoor_rop::{EventCounts, ReplayOptions, StateBits};
+use screendoor_trace::error::Result;
+use screendoor_trace::picture::Picture;
 use screendoor_trace::trace::Trace;
 
 /// What to measure on a trace.

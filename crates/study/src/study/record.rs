@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::metrics::{EnsembleErrors, Estimate};
-use screendoor_rop::{EventCounts, Promises, StateBits};
 use crate::study::throughput::Spread;
+use screendoor_rop::{EventCounts, Promises, StateBits};
 
 /// Part of a record, for those who read records alone.
 pub use screendoor_rop::Promise;

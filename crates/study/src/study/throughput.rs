@@ -5,10 +5,10 @@ use std::time::Instant;
 use serde::{Deserialize, Serialize};
 use statrs::statistics::{Data, OrderStatistics};
 
-use screendoor_designs::Configured;
-use screendoor_trace::error::Result;
-use screendoor_rop::{ReplayOptions, StateBits};
 use crate::study::engine::{Engine, EngineName};
+use screendoor_designs::Configured;
+use screendoor_rop::{ReplayOptions, StateBits};
+use screendoor_trace::error::Result;
 use screendoor_trace::tile::TILE_PIXELS;
 use screendoor_trace::trace::{SampleMask, Trace};
 

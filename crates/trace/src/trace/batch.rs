@@ -179,7 +179,7 @@ impl Batch {
     }
 
     /// The stored values of each column, in file order; `None` for constants.
-    pub(crate) fn buffers(&self) -> [(ColumnId, Option<(ValueType, &Buffer)>); 12] {
+    pub fn buffers(&self) -> [(ColumnId, Option<(ValueType, &Buffer)>); 12] {
         use ColumnId::*;
         let channel =
             |c: usize| typed!(&self.colour[c], ChannelColumn::{F16, F32}, c => c.buffer());

@@ -26,15 +26,25 @@ type Values<T> = [T; BLOCK + STRETCH];
 #[derive(Clone, Debug)]
 pub struct Block {
     len: usize,
+    /// Columns of the pixels, from the left.
     pub x: Values<u16>,
+    /// Rows of the pixels, from the top.
     pub y: Values<u16>,
+    /// Covered samples, one bit each.
     pub coverage: Values<u64>,
+    /// Depths at the pixels' centres, in 2^-32 of the range (unorm32).
     pub z: Values<u32>,
+    /// Change of depth over a pixel to the right, in the same units.
     pub dzdx: Values<i32>,
+    /// The same downwards.
     pub dzdy: Values<i32>,
+    /// Linear red, green and blue.
     pub colour: [Values<f32>; 3],
+    /// Opacities, 0 to 1.
     pub alpha: Values<f32>,
+    /// Numbers of the primitives.
     pub primitive: Values<u32>,
+    /// Numbers of the objects.
     pub object: Values<u32>,
 }
 

@@ -220,7 +220,7 @@ impl Trace {
 
     /// The columns that are stored, in the file's order, and the types as which they are
     /// read; the others are constant.
-    pub(crate) fn columns(&self) -> &[(ColumnId, ValueType)] {
+    pub fn columns(&self) -> &[(ColumnId, ValueType)] {
         &self.inner.columns
     }
 

@@ -1,7 +1,5 @@
 //! The fast engine of a stochastic design.
 
-use screendoor_trace::picture::TilePixels;
-use crate::resolve::box_filter;
 use crate::contract::contents::Contents;
 use crate::contract::design::Design;
 use crate::contract::engine::{Engine, Listener, TileState, Told, sites};
@@ -10,11 +8,13 @@ use crate::contract::frame::Site;
 use crate::contract::layout::Layout;
 use crate::contract::over_opaque::Transparent;
 use crate::lanes::{Count, Width};
+use crate::resolve::box_filter;
 use crate::stochastic::fast::kernel;
 use crate::stochastic::fast::sampler::FastSampler;
 use crate::stochastic::fast::state::{FastTile, boxed};
 use crate::stochastic::fast::twin::FastEngine;
 use crate::stochastic::methods::{Pass, Round};
+use screendoor_trace::picture::TilePixels;
 use screendoor_trace::tile::{TILE_PIXELS, TileGrid, TileId};
 use screendoor_trace::trace::{Block, Fragment};
 

@@ -16,6 +16,8 @@ mod references;
 mod sampler;
 mod state;
 mod tally;
+#[cfg(test)]
+mod tests;
 mod tracked;
 mod twin;
 
@@ -29,4 +31,4 @@ pub use tally::Tally;
 pub use tracked::{FastTracked, Given, Published, Rules, is_published};
 pub use twin::FastEngine;
 #[cfg(test)]
-pub use twin::Flaw;
+use twin::Flaw;

@@ -117,8 +117,8 @@ mod tests {
     use fearless_simd::Level;
 
     use super::*;
-    use screendoor_trace::random::Stream;
     use crate::lanes::{Count, Width, levels};
+    use screendoor_trace::random::Stream;
 
     #[derive(Clone, Copy, PartialEq, Debug)]
     enum Order {

@@ -8,9 +8,7 @@ use crate::lanes::Lanes;
 use crate::stochastic::fast::sampler::Loaded;
 use crate::stochastic::fast::tally::Tally;
 use crate::stochastic::methods::Round;
-use crate::stochastic::reference_value::{
-    LK2011, Reference, ReferenceKey, place, scramble_lk2011,
-};
+use crate::stochastic::reference_value::{LK2011, Reference, ReferenceKey, place, scramble_lk2011};
 use crate::stochastic::tracked::{Hashed, References, SampleOf};
 
 /// The samples of a fragment that are to be numbered.

@@ -4,9 +4,9 @@ use crate::contract::event::Probe;
 use crate::contract::frame::Site;
 use crate::lanes::Lanes;
 use crate::stochastic::methods::{Round, Sampler};
+use fearless_simd::Simd;
 use screendoor_trace::tile::{TILE_PIXELS, TileGrid, TileId};
 use screendoor_trace::trace::{Block, Fragment};
-use fearless_simd::Simd;
 
 use crate::stochastic::fast::limit::Limit;
 use crate::stochastic::fast::tally::Tally;

@@ -2,7 +2,6 @@
 
 use fearless_simd::Simd;
 
-use screendoor_trace::param::Values;
 use crate::contract::event::Probe;
 use crate::lanes::Lanes;
 use crate::stochastic::depth_bits;
@@ -18,6 +17,7 @@ use crate::stochastic::tracked::{
     COMPACT, PIXEL_ORDER, PREHASH, REFERENCE, References, SORT, SURFACES, SampleOf, TRACK,
     TrackedSampler, TrackedState,
 };
+use screendoor_trace::param::Values;
 use screendoor_trace::tile::{TILE_PIXELS, TileGrid, TileId};
 use screendoor_trace::trace::SampleMask;
 

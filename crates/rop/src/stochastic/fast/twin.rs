@@ -7,9 +7,9 @@ use crate::lanes::{Count, Lanes, Width};
 use crate::stochastic::fast::sampler::{FastSampler, Loaded};
 use crate::stochastic::fast::state::{FastTile, PlainPixel};
 use crate::stochastic::methods::Stochastic;
+use fearless_simd::{Level, Simd};
 use screendoor_trace::tile::TileGrid;
 use screendoor_trace::trace::{Fragment, SampleMask};
-use fearless_simd::{Level, Simd};
 
 /// Words that every fragment of a replay needs.
 pub struct Constants<W: Width> {

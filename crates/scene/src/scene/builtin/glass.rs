@@ -2,12 +2,12 @@
 
 use glam::{DAffine3, Vec2, Vec3};
 
-use screendoor_trace::param::{Param, Values};
-use screendoor_trace::random::Stream;
 use crate::scene::builtin::outlines::direction;
 use crate::scene::builtin::shapes::Solid;
 use crate::scene::builtin::{Builtin, SEED, seed};
 use crate::scene::{Material, Object, Scene, Shape, View};
+use screendoor_trace::param::{Param, Values};
+use screendoor_trace::random::Stream;
 
 pub(super) const SCENE: Builtin = Builtin {
     name: "glass",

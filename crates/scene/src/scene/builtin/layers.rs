@@ -3,10 +3,10 @@
 
 use glam::Vec3;
 
-use screendoor_trace::param::{Param, Values};
-use screendoor_trace::random::Stream;
 use crate::scene::builtin::{Builtin, SEED, seed};
 use crate::scene::{AlphaMode, Material, Mesh, Scene, Shape, View};
+use screendoor_trace::param::{Param, Values};
+use screendoor_trace::random::Stream;
 
 pub(super) const SCENE: Builtin = Builtin {
     name: "layers",

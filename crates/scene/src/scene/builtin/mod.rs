@@ -12,9 +12,9 @@ mod ramps;
 mod shapes;
 mod smoke;
 
+use crate::scene::Scene;
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::param::{Param, Values, parse_spec};
-use crate::scene::Scene;
 
 /// A built-in scene.
 #[derive(Clone, Copy, Debug)]
@@ -78,8 +78,8 @@ pub fn build(spec: &str) -> Result<Scene> {
 mod tests {
     use super::*;
     use crate::capture::{Capture, CaptureOptions};
-    use screendoor_trace::param::Kind;
     use crate::scene::load;
+    use screendoor_trace::param::Kind;
     use screendoor_trace::trace::{TraceWriter, WriteOptions};
 
     /// The scene's name with settings.

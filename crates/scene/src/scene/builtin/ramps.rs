@@ -2,9 +2,9 @@
 
 use glam::{Vec2, Vec3, Vec4};
 
-use screendoor_trace::param::Values;
 use crate::scene::builtin::Builtin;
 use crate::scene::{AlphaMode, Material, Mesh, Scene, Shape, View};
+use screendoor_trace::param::Values;
 
 pub(super) const SCENE: Builtin = Builtin {
     name: "ramps",

@@ -3,11 +3,11 @@
 
 use glam::{Vec2, Vec3, Vec4};
 
-use screendoor_trace::param::{Param, Values};
-use screendoor_trace::random::{Stream, hash};
 use crate::scene::builtin::noise::{curl, fractal, smooth};
 use crate::scene::builtin::{Builtin, SEED, seed};
 use crate::scene::{AlphaMode, Material, Particles, Scene, Shape, Texture, TextureUse, View, Wrap};
+use screendoor_trace::param::{Param, Values};
+use screendoor_trace::random::{Stream, hash};
 
 pub(super) const SCENE: Builtin = Builtin {
     name: "smoke",

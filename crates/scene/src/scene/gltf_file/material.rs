@@ -6,9 +6,9 @@ use super::Loader;
 use super::document::shortened;
 use super::json::{self, TextureInfo};
 use super::told::Matter;
-use screendoor_trace::error::{Result, one_line};
 use crate::scene::texture::Encoding;
 use crate::scene::{AlphaMode, Material, TextureUse};
+use screendoor_trace::error::{Result, one_line};
 
 /// How many sets of texture coordinates a material can use.
 pub(super) const SETS: usize = 2;

@@ -26,9 +26,9 @@ use self::material::Made;
 use self::primitive::{Drawn, Posed};
 use self::texture::TextureKey;
 use self::told::{Matter, Told};
-use screendoor_trace::error::{Error, Result, one_line};
 use crate::scene::folder::Folder;
 use crate::scene::{Object, Scene, file, file_name};
+use screendoor_trace::error::{Error, Result, one_line};
 
 /// The deepest nesting of nodes.
 const MAX_DEPTH: usize = 256;

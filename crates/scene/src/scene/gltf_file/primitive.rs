@@ -9,8 +9,8 @@ use super::json::{Attributes, Node, Primitive};
 use super::material::{Made, SETS};
 use super::pose::{Bound, Joints, Set, normal_matrix};
 use super::told::Matter;
-use screendoor_trace::error::Result;
 use crate::scene::{Mesh, Shape};
+use screendoor_trace::error::Result;
 
 /// A mesh as a node shows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

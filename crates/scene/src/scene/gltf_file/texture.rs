@@ -6,10 +6,10 @@ use super::Loader;
 use super::extensions::TEXTURE_SOURCES;
 use super::json::{Sampler, TextureSource};
 use super::told::Matter;
-use screendoor_trace::error::Result;
 use crate::scene::image_file;
 use crate::scene::texture::Encoding;
 use crate::scene::{Filter, Sampling, Texture, Wrap};
+use screendoor_trace::error::Result;
 
 /// What makes textures of the file the same in the scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

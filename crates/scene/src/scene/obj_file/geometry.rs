@@ -7,9 +7,9 @@ use glam::{DVec3, Vec2, Vec3, Vec4};
 use super::lines::{Lines, Statement, shown};
 use super::mtl::Library;
 use super::unread::Unread;
-use screendoor_trace::error::{Error, Result, one_line};
 use crate::scene::Scene;
 use crate::scene::folder::Folder;
+use screendoor_trace::error::{Error, Result, one_line};
 
 /// What corners of faces name: vertices, texture coordinates and normals.
 pub(super) const KINDS: [&str; 3] = ["vertex", "texture coordinate", "normal"];

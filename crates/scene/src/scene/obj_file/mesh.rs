@@ -5,10 +5,10 @@ use std::collections::HashMap;
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
 use super::geometry::{Face, Geometry, Segment};
-use screendoor_trace::error::{Error, Result};
-use screendoor_trace::picture::srgb;
 use crate::scene::Mesh;
 use crate::scene::polygon::{Corner, Cutter};
+use screendoor_trace::error::{Error, Result};
+use screendoor_trace::picture::srgb;
 
 /// A scene further from the origin than this many times its size is moved there before its
 /// places are rounded to single precision.

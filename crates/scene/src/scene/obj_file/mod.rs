@@ -15,9 +15,9 @@ use glam::DAffine3;
 use self::geometry::Reader;
 use self::lines::Lines;
 use self::mesh::Builder;
-use screendoor_trace::error::Result;
 use crate::scene::folder::Folder;
 use crate::scene::{AlphaMode, Material, Scene, Shape, file, file_name};
+use screendoor_trace::error::Result;
 
 /// Loads the OBJ file at `path`; materials and textures that are missing become
 /// warnings.

@@ -8,11 +8,11 @@ use glam::{Vec3, Vec4};
 use super::lines::{Lines, Statement};
 use super::map::{Map, map};
 use super::unread::Unread;
-use screendoor_trace::error::{Result, one_line};
 use crate::scene::folder::{Folder, Found};
 use crate::scene::image_file::{self, Channel};
 use crate::scene::texture::Encoding;
 use crate::scene::{AlphaMode, Material, Scene, Texture, TextureUse, Wrap};
+use screendoor_trace::error::{Result, one_line};
 
 /// How many bad statements of a file are told one by one.
 const MAX_TOLD: usize = 20;

@@ -20,12 +20,12 @@ use glam::{DAffine3, DVec3, Mat3, Quat, Vec3};
 use ply_rs_bw::ply::ScalarType;
 
 use self::ply::Element;
-use screendoor_trace::error::{Error, Result};
-use screendoor_trace::picture::srgb;
 use crate::scene::bytes::Bytes;
 use crate::scene::{
     AlphaMode, Material, Particles, Scene, Shape, TextureUse, View, file, file_name, sprite,
 };
+use screendoor_trace::error::{Error, Result};
+use screendoor_trace::picture::srgb;
 
 /// How many splats share a chunk.
 const CHUNK: usize = 256;

@@ -6,8 +6,8 @@
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{DefaultElement, Encoding, PropertyType, ScalarType};
 
-use screendoor_trace::error::Result;
 use crate::scene::bytes::Bytes;
+use screendoor_trace::error::Result;
 
 /// The longest header that is read, in bytes.
 const MAX_HEADER: usize = 1 << 20;

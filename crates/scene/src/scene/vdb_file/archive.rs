@@ -4,8 +4,8 @@
 use glam::{DAffine3, DMat3, DVec3};
 
 use super::packed::Packing;
-use screendoor_trace::error::{Error, Result, one_line};
 use crate::scene::bytes::Bytes;
+use screendoor_trace::error::{Error, Result, one_line};
 
 /// The versions of the file format that are read: from the one on that says for
 /// each grid how it is packed (OpenVDB 3.0, 2014) to the newest known.

@@ -21,12 +21,12 @@ use std::path::Path;
 use glam::{Vec3, Vec4};
 
 use self::tree::Voxel;
-use screendoor_trace::error::{Error, Result};
-use screendoor_trace::random::Stream;
 use crate::scene::bytes::Bytes;
 use crate::scene::{
     AlphaMode, Material, Particles, Scene, Shape, TextureUse, View, file, file_name, sprite,
 };
+use screendoor_trace::error::{Error, Result};
+use screendoor_trace::random::Stream;
 
 /// A billboard's alpha, where its texture has 1.
 const ALPHA: f32 = 0.05;

@@ -6,8 +6,8 @@
 
 use flate2::{Decompress, FlushDecompress, Status};
 
-use screendoor_trace::error::Result;
 use crate::scene::bytes::Bytes;
+use screendoor_trace::error::Result;
 
 /// How a grid's blocks are packed: OpenVDB's own flags.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -8,8 +8,8 @@ use glam::IVec3;
 use half::f16;
 
 use super::archive::Grid;
-use screendoor_trace::error::{Error, Result};
 use crate::scene::bytes::Bytes;
+use screendoor_trace::error::{Error, Result};
 
 /// Voxels, children, along a node's side, as powers of 2.
 const LEAF: u32 = 3;

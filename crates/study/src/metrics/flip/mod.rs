@@ -21,12 +21,12 @@ use std::sync::OnceLock;
 
 pub use map::{FlipFigures, FlipMap};
 
-use screendoor_trace::picture::Picture;
-use screendoor_trace::tile::TileGrid;
 use colour::Contrast;
 use exposure::Exposure;
 use features::Features;
 use filter::Size;
+use screendoor_trace::picture::Picture;
+use screendoor_trace::tile::TileGrid;
 
 /// Pixels in a degree of the viewer's field: 0.7 m before a screen that is 0.7 m and
 /// 3840 pixels wide, the default of both papers.

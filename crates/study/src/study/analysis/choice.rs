@@ -182,9 +182,9 @@ fn separation(results: &Results, best: RunName<'_>, second: RunName<'_>) -> Sepa
 #[cfg(test)]
 mod tests {
     use super::*;
-    use screendoor_trace::param::Options;
-    use screendoor_rop::Promise;
     use crate::study::analysis::made_up::{exactly, planted};
+    use screendoor_rop::Promise;
+    use screendoor_trace::param::Options;
 
     fn near(value: f64) -> Estimate {
         Estimate { value, low: value * 0.98, high: value * 1.02 }

@@ -3,21 +3,21 @@
 use std::collections::BTreeMap;
 
 use crate::metrics::{EnsembleErrors, Estimate, Temporal};
-use screendoor_rop::{EventCounts, Promise, StateBits};
 use crate::study::file::{SceneEntry, Study};
 use crate::study::record::{Filtered, FlipOverSeeds, Promised, Record, SpectrumOverSeeds, Speed};
 use crate::study::results::{Machine, Missing, Results, SceneFacts};
 use crate::study::throughput::Spread;
+use screendoor_rop::{EventCounts, Promise, StateBits};
 use screendoor_trace::trace::{AlphaStatistics, Distribution, Objects, Statistics};
 
 /// A value that is known without doubt.
-pub(crate) fn exactly(value: f64) -> Estimate {
+pub fn exactly(value: f64) -> Estimate {
     Estimate { value, low: value, high: value }
 }
 
 /// Results with these errors: for each design one a scene, the same at all sample counts.
 /// The first design is the baseline.
-pub(crate) fn planted(scenes: &[&str], counts: &[u32], designs: &[(&str, &[Estimate])]) -> Results {
+pub fn planted(scenes: &[&str], counts: &[u32], designs: &[(&str, &[Estimate])]) -> Results {
     let mut results = empty(scenes, counts, &designs.iter().map(|d| d.0).collect::<Vec<_>>());
     for (i, scene) in scenes.iter().enumerate() {
         for samples in counts {
@@ -107,7 +107,7 @@ fn facts(name: &str, place: usize) -> SceneFacts {
 }
 
 /// A record with an error and nothing else of note.
-pub(crate) fn record(scene: &str, series: &str, samples: u32, rmse: Estimate) -> Record {
+pub fn record(scene: &str, series: &str, samples: u32, rmse: Estimate) -> Record {
     let design = series.replace("{n}", &samples.to_string());
     let errors = EnsembleErrors {
         seeds: 8,
@@ -193,7 +193,7 @@ const SCENES: [&str; 9] =
 
 /// Plausible results of this size, with holes where a study has them: a scene that lacks,
 /// a run that failed, designs without a GPU port.
-pub(crate) fn plausible(scenes: usize, designs: usize, counts: &[u32]) -> Results {
+pub fn plausible(scenes: usize, designs: usize, counts: &[u32]) -> Results {
     let names: Vec<&str> = HABITS.iter().take(designs).map(|h| h.0).collect();
     let mut results = empty(&SCENES[..scenes], counts, &names);
     if names.contains(&"lk") {

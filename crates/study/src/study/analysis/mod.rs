@@ -9,8 +9,9 @@ mod convergence;
 mod cost;
 mod front;
 mod kept;
-#[cfg(test)]
-pub(crate) mod made_up;
+/// Results that nobody measured, for tests.
+#[cfg(any(test, feature = "made-up"))]
+pub mod made_up;
 mod relative;
 
 pub use choice::{

@@ -3,9 +3,9 @@
 use serde::Serialize;
 
 use screendoor_designs::{Configured, DESIGNS, Entry, REFERENCE, configure};
+use screendoor_rop::Family;
 use screendoor_trace::error::Result;
 use screendoor_trace::param::Kind;
-use screendoor_rop::Family;
 
 /// A design in the comparison: its settings for any count.
 #[derive(Clone, Debug, Serialize)]

@@ -9,14 +9,14 @@ use serde::Serialize;
 
 pub use contenders::{Contender, SLAB_CLAIM, SLAB_LAYERS, SLAB_LIMIT, SLAB_RIVALS, contenders};
 
-use screendoor_scene::capture::{Capture, CaptureOptions, Faces, Order, PatternKind};
-use screendoor_designs::{REFERENCE, configure};
-use screendoor_trace::error::Result;
 use crate::metrics::{Ensemble, EnsembleErrors, PixelClasses};
-use screendoor_rop::ReplayOptions;
-use screendoor_scene::scene::{self, Scene};
 use crate::study::comparison::contenders::claimed;
 use crate::study::publications::claims::{Trial, dial};
+use screendoor_designs::{REFERENCE, configure};
+use screendoor_rop::ReplayOptions;
+use screendoor_scene::capture::{Capture, CaptureOptions, Faces, Order, PatternKind};
+use screendoor_scene::scene::{self, Scene};
+use screendoor_trace::error::Result;
 use screendoor_trace::trace::{Statistics, Trace, statistics};
 
 /// Samples per pixel, or layers, that every design is run with.

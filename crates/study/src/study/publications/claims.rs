@@ -6,12 +6,12 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use screendoor_scene::capture::PatternKind;
-use screendoor_trace::error::Result;
 use crate::metrics::{Ensemble, EnsembleErrors, Estimate, PixelClasses, Region};
 use crate::study::comparison::{SLAB_LAYERS, SceneSpec};
 use crate::study::publications::figures::averaged;
 use crate::study::publications::{Effort, replay};
+use screendoor_scene::capture::PatternKind;
+use screendoor_trace::error::Result;
 use screendoor_trace::tile::TileGrid;
 use screendoor_trace::trace::Trace;
 

@@ -4,10 +4,10 @@
 
 use serde::Serialize;
 
-use screendoor_trace::error::Result;
 use crate::metrics::Estimate;
-use screendoor_rop::stochastic::Method;
 use crate::study::publications::{replay, whole_layers};
+use screendoor_rop::stochastic::Method;
+use screendoor_trace::error::Result;
 
 /// One layer: linear colour and alpha.
 pub type Layer = ([f32; 3], f32);

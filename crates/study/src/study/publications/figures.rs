@@ -1,13 +1,13 @@
 //! The pictures of LK's figures, and the noise of those that show it.
 
-use screendoor_scene::capture::CaptureOptions;
-use screendoor_trace::error::Result;
-use screendoor_trace::picture::Picture;
-use screendoor_scene::scene;
 use crate::study::publications::noise::{CORRELATION_SEEDS, FigureNoise, Noise, edge_noise, noise};
 use crate::study::publications::sampling::layers;
 use crate::study::publications::table_1::{SCENES, Table1Scene};
 use crate::study::publications::{Effort, capture, replay};
+use screendoor_scene::capture::CaptureOptions;
+use screendoor_scene::scene;
+use screendoor_trace::error::Result;
+use screendoor_trace::picture::Picture;
 use screendoor_trace::tile::TileGrid;
 use screendoor_trace::trace::Trace;
 

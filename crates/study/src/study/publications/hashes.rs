@@ -5,11 +5,11 @@ use std::collections::HashSet;
 
 use serde::Serialize;
 
-use screendoor_trace::error::Result;
 use crate::metrics::{Ensemble, Estimate, Region};
-use screendoor_trace::param::Options;
-use screendoor_rop::{PixelIndex, Reference, ReferenceKey, Threshold};
 use crate::study::publications::{replay, whole_layers};
+use screendoor_rop::{PixelIndex, Reference, ReferenceKey, Threshold};
+use screendoor_trace::error::Result;
+use screendoor_trace::param::Options;
 use screendoor_trace::tile::TileGrid;
 
 /// One hash, with or without the seeds hashed first.

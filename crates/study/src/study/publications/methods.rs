@@ -5,14 +5,14 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use screendoor_scene::capture::CaptureOptions;
-use screendoor_trace::error::Result;
 use crate::metrics::{Ensemble, Estimate, PixelClasses};
-use screendoor_rop::{visible_independent, visible_stratified};
 use crate::study::publications::claims::{Claims, claims};
 use crate::study::publications::examples::{BiasCase, ExampleRow, bias_cases, examples};
 use crate::study::publications::hashes::{HashRow, hashes};
 use crate::study::publications::{Effort, NamedPicture, capture, replay};
+use screendoor_rop::{visible_independent, visible_stratified};
+use screendoor_scene::capture::CaptureOptions;
+use screendoor_trace::error::Result;
 use screendoor_trace::trace::{Statistics, statistics};
 
 /// Everything that is reproduced of the methods.

@@ -20,13 +20,13 @@ pub use reproduced::{Reproduced, measure_publication};
 pub use sampling::{FarSamples, MIXED, MeanError, RowDifference};
 pub use table_1::{Aspect, COUNTS, DESIGNS, Published, Table1, Variation};
 
+use screendoor_designs::{Configured, configure};
+use screendoor_rop::{ReplayOptions, Replayed};
 pub use screendoor_scene::capture::Order;
 use screendoor_scene::capture::{Capture, CaptureOptions, PatternKind, pattern};
-use screendoor_designs::{Configured, configure};
+use screendoor_scene::scene;
 use screendoor_trace::error::Result;
 use screendoor_trace::picture::Picture;
-use screendoor_rop::{ReplayOptions, Replayed};
-use screendoor_scene::scene;
 use screendoor_trace::trace::{
     ColourFormat, DepthPlane, Fragment, Header, SampleMask, Trace, TraceWriter, Unorm32,
     WriteOptions,

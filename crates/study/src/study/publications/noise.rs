@@ -2,11 +2,11 @@
 
 use serde::Serialize;
 
-use screendoor_trace::error::Result;
 use crate::metrics::{Estimate, PixelClasses, Region, UNIT, errors};
-use screendoor_trace::picture::Picture;
 use crate::study::publications::figures::averaged;
 use crate::study::publications::replay;
+use screendoor_trace::error::Result;
+use screendoor_trace::picture::Picture;
 use screendoor_trace::tile::TileGrid;
 use screendoor_trace::trace::Trace;
 

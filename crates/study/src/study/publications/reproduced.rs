@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use screendoor_trace::error::Result;
 use crate::study::comparison::{Comparison, compare, compare_slab};
 use crate::study::file::Publication;
 use crate::study::publications::methods::{Methods, methods};
 use crate::study::publications::{Effort, Publications, reproduce};
 use crate::study::stress::{Stability, stress_designs};
+use screendoor_trace::error::Result;
 
 /// What was measured of a publication.
 #[derive(Debug)]

@@ -4,12 +4,12 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use screendoor_scene::capture::{Capture, CaptureOptions};
-use screendoor_designs::configure;
-use screendoor_trace::error::Result;
 use crate::metrics::{Ensemble, Estimate, PixelClasses};
 use crate::study::comparison::SceneSpec;
 use crate::study::publications::{Effort, capture, replay};
+use screendoor_designs::configure;
+use screendoor_scene::capture::{Capture, CaptureOptions};
+use screendoor_trace::error::Result;
 use screendoor_trace::trace::{Trace, tied_fragments};
 
 /// How many samples a far surface keeps under a near one, both α = 0.5 at 16

@@ -4,13 +4,13 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use screendoor_scene::capture::{CameraOptions, Capture, CaptureOptions, Faces, Order};
-use screendoor_trace::error::Result;
 use crate::metrics::{Estimate, PixelClasses, errors};
-use screendoor_scene::scene;
 use crate::study::comparison::SceneSpec;
 use crate::study::publications::{Effort, MEMORY, capture, designs, replay};
 use crate::study::{Plan, Run, measure};
+use screendoor_scene::capture::{CameraOptions, Capture, CaptureOptions, Faces, Order};
+use screendoor_scene::scene;
+use screendoor_trace::error::Result;
 use screendoor_trace::trace::{SampleMask, Statistics, Trace, statistics};
 
 /// Sample counts of LK's table 1.

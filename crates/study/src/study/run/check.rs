@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use screendoor_trace::error::{Error, Result};
-use screendoor_scene::scene;
 use crate::study::engine::EngineName;
 use crate::study::file::{SceneEntry, Study};
 use crate::study::run::store::{record_path, trace_path};
 use crate::study::run::tasks::{Job, Shard, Task, tasks};
+use screendoor_scene::scene;
+use screendoor_trace::error::{Error, Result};
 use screendoor_trace::trace::Trace;
 
 /// Finds out what would keep the runs of a part from being done that are not in `folder` yet:

@@ -5,20 +5,20 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use screendoor_designs::Configured;
-use screendoor_trace::error::Result;
 use crate::metrics::{
     Ensemble, EnsembleErrors, Estimate, FlipFigures, Spectrum, errors, filtered_rmse,
 };
-use screendoor_trace::param::Options;
-use screendoor_trace::picture::Picture;
-use screendoor_rop::{EventCounts, ReplayOptions, Replayed, StateBits, Which};
 use crate::study::engine::{Engine, EngineName, OnGpu};
 use crate::study::file::{Metric, Study};
 use crate::study::record::{Filtered, FlipOverSeeds, Record, SpectrumOverSeeds, Speed};
 use crate::study::run::scene::{OpenScene, Reference, Watch};
 use crate::study::run::tasks::Job;
 use crate::study::throughput::Spread;
+use screendoor_designs::Configured;
+use screendoor_rop::{EventCounts, ReplayOptions, Replayed, StateBits, Which};
+use screendoor_trace::error::Result;
+use screendoor_trace::param::Options;
+use screendoor_trace::picture::Picture;
 
 /// Standard deviations of the Gaussians that stand for a viewer further away, in pixels.
 pub const SIGMAS: [f64; 2] = [1.0, 2.0];

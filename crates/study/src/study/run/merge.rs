@@ -4,10 +4,10 @@ use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 
-use screendoor_trace::error::{Error, Result};
-use screendoor_trace::output::{OutputFile, is_partial};
 use crate::study::record::Record;
 use crate::study::run::store::Store;
+use screendoor_trace::error::{Error, Result};
+use screendoor_trace::output::{OutputFile, is_partial};
 
 /// Puts the parts in `parts` together in the folder of `into`. What is there already stays;
 /// done again it changes nothing.

@@ -18,9 +18,6 @@ pub use merge::{agree, merge};
 pub use store::{Store, read_json};
 pub use tasks::{Job, Shard, Task, jobs, tasks};
 
-use screendoor_trace::error::{Error, Result, panic_text};
-use screendoor_trace::picture::{Layer, Picture, write_exr};
-use screendoor_rop::{ExplainLimits, Site};
 use crate::study::engine::EngineName;
 use crate::study::explained::Explained;
 use crate::study::file::Publication;
@@ -28,6 +25,9 @@ use crate::study::record::Record;
 use crate::study::results::Machine;
 use crate::study::run::measure::{Engines, measure};
 use crate::study::run::scene::{OpenScene, Reference, Watch};
+use screendoor_rop::{ExplainLimits, Site};
+use screendoor_trace::error::{Error, Result, panic_text};
+use screendoor_trace::picture::{Layer, Picture, write_exr};
 
 /// Where a study is measured and what is told of it.
 pub struct Runner<'a> {

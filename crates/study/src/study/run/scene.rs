@@ -2,17 +2,17 @@
 
 use std::path::Path;
 
-use screendoor_scene::capture::Capture;
-use screendoor_designs::{REFERENCE, configure};
-use screendoor_trace::error::{Error, Result};
 use crate::metrics::{Flip, PixelClasses, Region};
-use screendoor_trace::output::OutputFile;
-use screendoor_trace::picture::Picture;
-use screendoor_scene::scene;
 use crate::study::file::{Metric, SceneEntry, Study};
 use crate::study::results::SceneFacts;
 use crate::study::run::store::Store;
 use crate::study::throughput::work;
+use screendoor_designs::{REFERENCE, configure};
+use screendoor_scene::capture::Capture;
+use screendoor_scene::scene;
+use screendoor_trace::error::{Error, Result};
+use screendoor_trace::output::OutputFile;
+use screendoor_trace::picture::Picture;
 use screendoor_trace::tile::{TILE_PIXELS, TileGrid, TileMap};
 use screendoor_trace::trace::{Trace, TraceWriter, WriteOptions, statistics, tied_fragments};
 

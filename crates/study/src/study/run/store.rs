@@ -7,13 +7,13 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use screendoor_trace::error::{Error, Result};
-use screendoor_trace::output::{OutputFile, is_partial};
-use screendoor_trace::param::Options;
 use crate::study::file::{Publication, Study};
 use crate::study::record::Record;
 use crate::study::results::{Machine, Missing, Results, SceneFacts};
 use crate::study::run::tasks::{Job, jobs};
+use screendoor_trace::error::{Error, Result};
+use screendoor_trace::output::{OutputFile, is_partial};
+use screendoor_trace::param::Options;
 use screendoor_trace::trace::Trace;
 
 /// The folder of a study.

@@ -2,8 +2,8 @@
 
 use std::str::FromStr;
 
-use screendoor_trace::error::{Error, Result};
 use crate::study::file::{Publication, Study};
+use screendoor_trace::error::{Error, Result};
 
 /// One design at one sample count on one scene.
 #[derive(Clone, PartialEq, Eq, Debug)]

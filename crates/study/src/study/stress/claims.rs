@@ -7,8 +7,8 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use screendoor_trace::error::{Error, Result};
 use crate::study::stress::child::{Ended, command, run};
+use screendoor_trace::error::{Error, Result};
 
 /// Longest time that a refusal may take, in seconds.
 pub const MOST_SECONDS: f64 = 0.1;

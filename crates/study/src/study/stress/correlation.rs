@@ -5,13 +5,13 @@ use rayon::prelude::*;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, Normal};
 
-use screendoor_designs::Configured;
-use screendoor_trace::error::Result;
-use screendoor_trace::picture::Picture;
-use screendoor_rop::{Reference, ReplayOptions};
 use crate::study::publications::hashes::Values;
 use crate::study::stress::SIGNIFICANCE;
 use crate::study::stress::case::{Case, Group, layer};
+use screendoor_designs::Configured;
+use screendoor_rop::{Reference, ReplayOptions};
+use screendoor_trace::error::Result;
+use screendoor_trace::picture::Picture;
 use screendoor_trace::trace::{Fragment, Trace};
 
 /// Distances that are tried: between numbers of surfaces, seeds and pixels.

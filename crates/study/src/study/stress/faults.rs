@@ -15,12 +15,12 @@ use std::time::Duration;
 use serde::Serialize;
 use tempfile::TempDir;
 
-use screendoor_designs::configure;
-use screendoor_trace::error::{Error, Result, panic_text};
-use screendoor_gpu::{self as gpu, Gpu, GpuOptions};
-use screendoor_trace::output::{OutputFile, is_partial};
-use screendoor_rop::ReplayOptions;
 use crate::study::stress::child::{Ended, command, disturbed, limited, run, terminate};
+use screendoor_designs::configure;
+use screendoor_gpu::{self as gpu, Gpu, GpuOptions};
+use screendoor_rop::ReplayOptions;
+use screendoor_trace::error::{Error, Result, panic_text};
+use screendoor_trace::output::{OutputFile, is_partial};
 use screendoor_trace::trace::Trace;
 
 /// A fault, how often it was brought about, and how often nothing was lost.
@@ -43,7 +43,8 @@ pub struct Fault {
 }
 
 impl Fault {
-    pub(crate) fn new(name: &'static str, what: &'static str) -> Self {
+    /// A fault that was not tried yet.
+    pub fn new(name: &'static str, what: &'static str) -> Self {
         let said = String::new();
         Fault { name, what, tries: 0, done: 0, survived: 0, said, failures: Vec::new() }
     }

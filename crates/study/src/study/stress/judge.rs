@@ -2,11 +2,11 @@
 
 use serde::Serialize;
 
-use screendoor_trace::error::Result;
 use crate::metrics::student_t;
-use screendoor_trace::picture::Picture;
 use crate::study::stress::case::Case;
 use crate::study::stress::truth::{Truth, truth};
+use screendoor_trace::error::Result;
+use screendoor_trace::picture::Picture;
 
 /// The chance that any bound of a whole table, on means or on correlations, is crossed by
 /// chance alone.
@@ -294,7 +294,9 @@ mod tests {
         let judge = Judge::new(&case, 100).unwrap();
         // All or nothing, decided by a hash: unbiased, however noisy.
         let coin = |seed: u32, lift: f64| {
-            picture(&case, |i| 2.0 * f64::from(screendoor_trace::random::hash([seed, i]) >> 31) + lift)
+            picture(&case, |i| {
+                2.0 * f64::from(screendoor_trace::random::hash([seed, i]) >> 31) + lift
+            })
         };
         let seeds = |lift: f64| (0..16).map(|s| coin(s, lift)).collect::<Vec<_>>();
         // So noisy that 16 seeds of 256 pixels do not tell a twentieth.

@@ -24,15 +24,15 @@ pub use faults::Fault;
 pub use judge::{DECIDED, Outcome, SIGNIFICANCE, Tally};
 pub use unfit::Unfit;
 
-use screendoor_designs::{Configured, DESIGNS, configure};
-use screendoor_trace::error::Result;
-use screendoor_gpu::{self as gpu, Gpu, GpuOptions, TOLERANCE};
-use screendoor_trace::param::Options;
-use screendoor_trace::picture::Picture;
-use screendoor_rop::stochastic::{METHOD, Method};
-use screendoor_rop::{Promise, ReplayOptions, Which, colour};
 use crate::study::engine::EngineName;
 use crate::study::stress::judge::Judge;
+use screendoor_designs::{Configured, DESIGNS, configure};
+use screendoor_gpu::{self as gpu, Gpu, GpuOptions, TOLERANCE};
+use screendoor_rop::stochastic::{METHOD, Method};
+use screendoor_rop::{Promise, ReplayOptions, Which, colour};
+use screendoor_trace::error::Result;
+use screendoor_trace::param::Options;
+use screendoor_trace::picture::Picture;
 use screendoor_trace::trace::{ColourFormat, Trace, tied_fragments};
 
 /// Seeds of cases with many fragments, at most.
@@ -317,7 +317,8 @@ impl Trial<'_> {
     }
 
     fn outcome(&self, design: &Configured, first: &Result<Picture>) -> Outcome {
-        let refused = |e: &screendoor_trace::error::Error| Outcome::Refused { message: e.to_string() };
+        let refused =
+            |e: &screendoor_trace::error::Error| Outcome::Refused { message: e.to_string() };
         let first = match first {
             Ok(picture) => picture.clone(),
             Err(e) => return refused(e),

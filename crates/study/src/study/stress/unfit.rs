@@ -3,8 +3,8 @@
 
 use serde::Serialize;
 
-use screendoor_trace::error::Result;
 use crate::study::stress::case::{Case, Group, layer, over};
+use screendoor_trace::error::Result;
 use screendoor_trace::trace::{Fragment, Trace, TraceWriter, WriteOptions};
 
 /// A value and what is said of it.

@@ -6,8 +6,8 @@
 
 use glam::{Vec2, Vec3};
 
-use screendoor_trace::random::Stream;
 use crate::scene::builtin::outlines::direction;
+use screendoor_trace::random::Stream;
 
 /// A square sheet of (cells + 1)² points.
 pub(super) struct Sheet {

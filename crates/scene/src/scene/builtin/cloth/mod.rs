@@ -6,9 +6,9 @@ mod fabric;
 use glam::{Affine2, Vec2, Vec3};
 use rayon::prelude::*;
 
-use screendoor_trace::param::{Param, Values};
 use crate::scene::builtin::{Builtin, SEED, seed};
 use crate::scene::{Material, Mesh, Scene, Shape, TextureUse, View};
+use screendoor_trace::param::{Param, Values};
 
 pub(super) const SCENE: Builtin = Builtin {
     name: "cloth",

@@ -12,11 +12,11 @@ use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2};
 
 use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
 
-use screendoor_trace::param::{Param, Values};
 use crate::scene::builtin::Builtin;
 use crate::scene::builtin::outlines::{cut, direction};
 use crate::scene::builtin::shapes::Solid;
 use crate::scene::{Material, Object, Scene, Shape, View};
+use screendoor_trace::param::{Param, Values};
 
 pub(super) const SCENE: Builtin = Builtin {
     name: "engine",

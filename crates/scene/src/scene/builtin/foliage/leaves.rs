@@ -3,10 +3,10 @@
 use glam::{Vec2, Vec3, Vec4};
 
 use super::Twig;
-use screendoor_trace::random::Stream;
 use crate::scene::builtin::noise::smooth;
 use crate::scene::builtin::outlines::direction;
 use crate::scene::{Mesh, Texture, Wrap};
+use screendoor_trace::random::Stream;
 
 /// Where the middle of the crown is: leaves within are in shade.
 const CROWN: Vec3 = Vec3::new(0.0, 2.0, 0.0);

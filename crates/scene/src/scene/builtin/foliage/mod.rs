@@ -5,9 +5,9 @@ mod wood;
 
 use glam::Vec3;
 
-use screendoor_trace::param::{Param, Values};
 use crate::scene::builtin::{Builtin, SEED, seed};
 use crate::scene::{AlphaMode, Material, Scene, Shape, TextureUse, View};
+use screendoor_trace::param::{Param, Values};
 
 pub(super) const SCENE: Builtin = Builtin {
     name: "foliage",

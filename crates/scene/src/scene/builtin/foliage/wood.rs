@@ -3,10 +3,10 @@
 use glam::{Vec3, Vec4};
 
 use super::Twig;
-use screendoor_trace::random::Stream;
 use crate::scene::builtin::noise::fractal;
 use crate::scene::builtin::outlines::{circle, direction};
 use crate::scene::builtin::shapes::Solid;
+use screendoor_trace::random::Stream;
 
 /// A tree without its leaves.
 pub(super) struct Tree {

@@ -5,9 +5,9 @@ use std::f32::consts::TAU;
 use glam::{Vec3, Vec4};
 
 use super::head::{NECK, NECK_HALF, SHOULDERS, SHOULDERS_HALF, SKULL, hairline};
-use screendoor_trace::random::Stream;
 use crate::scene::Strands;
 use crate::scene::builtin::noise::{smooth, vector};
+use screendoor_trace::random::Stream;
 
 /// How many locks the hairs gather into.
 const LOCKS: u32 = 260;

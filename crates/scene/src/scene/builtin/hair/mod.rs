@@ -3,9 +3,9 @@
 mod head;
 mod locks;
 
-use screendoor_trace::param::{Param, Values};
 use crate::scene::builtin::{Builtin, SEED, seed};
 use crate::scene::{Material, Scene, Shape, View};
+use screendoor_trace::param::{Param, Values};
 
 pub(super) const SCENE: Builtin = Builtin {
     name: "hair",

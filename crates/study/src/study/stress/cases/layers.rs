@@ -1,7 +1,7 @@
 //! Many layers, and transmittances that no float holds.
 
-use screendoor_trace::random::Stream;
 use crate::study::stress::case::{Case, Group, at_depth, hue, layer};
+use screendoor_trace::random::Stream;
 use screendoor_trace::trace::Fragment;
 
 /// `count` layers of one alpha, evenly through the depth range, in random order.
