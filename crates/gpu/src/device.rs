@@ -5,28 +5,12 @@ use std::fmt;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use serde::Serialize;
-
+use crate::options::Adapter;
 use screendoor_trace::error::{Error, Result};
 
 /// What to install where there is no adapter.
 const INSTALL: &str = "install a Vulkan driver: that of the graphics card, or Mesa's software \
                        driver (Debian and Ubuntu: mesa-vulkan-drivers)";
-
-/// What an adapter says about itself.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Adapter {
-    /// Its name.
-    pub name: String,
-    /// Its driver, with its version.
-    pub driver: String,
-    /// The interface it is reached by: `vulkan`, `metal`, `dx12`.
-    pub backend: String,
-    /// `discrete GPU`, `integrated GPU`, `virtual GPU`, `CPU` or `other`.
-    pub kind: &'static str,
-    /// Threads that run in step, at least and at most.
-    pub subgroup: [u32; 2],
-}
 
 impl Adapter {
     fn of(adapter: &wgpu::Adapter) -> Self {
@@ -50,13 +34,6 @@ impl Adapter {
     fn rank(&self) -> usize {
         let kinds = ["discrete GPU", "integrated GPU", "virtual GPU", "other", "CPU"];
         kinds.iter().position(|k| *k == self.kind).unwrap_or(kinds.len())
-    }
-}
-
-/// `NAME (driver …, vulkan)`.
-impl fmt::Display for Adapter {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} ({}, {})", self.name, self.driver, self.backend)
     }
 }
 

@@ -1,15 +1,14 @@
 //! Replaying a trace on a GPU: chunk by chunk, sorted by pixel there, a thread for each
 //! pixel; the pixels' state stays on the device.
 
-use std::collections::BTreeMap;
 use std::time::Instant;
 
 use rayon::prelude::*;
-use serde::Serialize;
 
 use crate::bin::{Binner, Scratch, Sorted, uniform};
 use crate::chunk::{Chunks, Uploaded};
 use crate::device::{Access, Gpu, most_bytes};
+use crate::options::{GpuOptions, GpuSeconds, Threads};
 use crate::params::Params;
 use crate::shader;
 use crate::time::Timer;
@@ -19,47 +18,6 @@ use screendoor_trace::error::Result;
 use screendoor_trace::picture::{Picture, TilePixels};
 use screendoor_trace::tile::{TILE_PIXELS, TileId, TileMap};
 use screendoor_trace::trace::Trace;
-
-screendoor_trace::options! {
-    /// What a thread is given. Pixels measure faster at every sample count (docs/PERFORMANCE.md).
-    pub enum Threads {
-        Pixel = "pixel": "a pixel",
-        Sample = "sample": "a sample, where the design is for it; those of a pixel work together",
-    }
-}
-
-/// How to replay on a GPU; none of it changes the picture.
-#[derive(Clone, Copy)]
-pub struct GpuOptions<'a> {
-    /// What a thread is given.
-    pub threads: Threads,
-    /// Rows of a chunk, at most; fewer where a buffer holds fewer.
-    pub rows: u64,
-    /// Bytes of chunks that stay on the device for the next pass.
-    pub resident: u64,
-    /// Is told how many fragments have been drawn, of how many.
-    pub progress: &'a (dyn Fn(u64, u64) + Sync),
-}
-
-impl Default for GpuOptions<'_> {
-    fn default() -> Self {
-        let threads = Threads::Pixel;
-        GpuOptions { threads, rows: u64::MAX, resident: 1 << 31, progress: &|_, _| () }
-    }
-}
-
-/// Where the time of a replay went, in seconds.
-#[derive(Clone, Debug, Default, Serialize)]
-pub struct GpuSeconds {
-    /// The whole, by the clock on the wall.
-    pub wall: f64,
-    /// Reading the file and bringing it to the device.
-    pub upload: f64,
-    /// Bringing the picture back, or the state, and resolving it.
-    pub back: f64,
-    /// By the device's clock, where it has one: `bin`, `draw` and others.
-    pub device: Option<BTreeMap<&'static str, f64>>,
-}
 
 /// A replay on a GPU, its state still there.
 pub struct GpuRun<'a> {

@@ -11,7 +11,7 @@ mod positions;
 mod rasteriser;
 mod scene;
 
-pub use check::{CrossCheck, Difference};
+pub use crate::differences::{CrossCheck, Difference};
 pub use fragments::{APPEND_WGSL, Captured, FragmentBuffer, RawFragment, append_wgsl, in_order};
 pub use positions::sample_positions;
 pub use scene::GpuCapture;

@@ -5,11 +5,11 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::capture::check::CrossCheck;
 use crate::capture::fragments::RawFragment;
 use crate::capture::positions::sample_positions;
 use crate::capture::rasteriser::{Corner, Rasteriser, SAMPLES};
 use crate::device::Gpu;
+use crate::differences::CrossCheck;
 use screendoor_scene::capture::{Capture, CaptureOptions, Drawing, PatternKind, Unseen};
 use screendoor_scene::scene::Scene;
 use screendoor_trace::error::{Error, Result};
