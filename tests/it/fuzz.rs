@@ -69,7 +69,7 @@ fn seeds() -> Vec<(&'static str, String, Vec<u8>)> {
     }
     let study = |file: &str| fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join(file)).unwrap();
     add("trace", "unaligned-footer", unaligned());
-    add("study", "default", study("src/study/default.toml"));
+    add("study", "default", study("crates/study/src/study/default.toml"));
     add("study", "small", study("workflow/small.toml"));
     add("study", "none", Vec::new());
     add("picture", "short", vec![0x76, 0x2f, 0x31, 0x01]);

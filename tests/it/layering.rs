@@ -1,114 +1,113 @@
-//! Imports follow the one-way flow of `docs/ARCHITECTURE.md`.
+//! The crates lie along the one-way flow of `docs/ARCHITECTURE.md`, and the files of the
+//! contract of designs need each other in no circle. That a crate cannot name what lies above
+//! it is the compiler's to say; here it is held what lies above what.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-/// The modules, and which others each may import. What all may import stands in
-/// `FOUNDATION`.
-const FLOW: &[(&str, &[&str])] = &[
-    ("error", &[]),
-    ("param", &[]),
-    ("random", &[]),
-    ("output", &[]),
-    ("tile", &[]),
-    ("picture", &[]),
-    ("scene", &["picture"]),
-    ("trace", &[]),
-    ("capture", &["scene", "trace"]),
-    ("resolve", &[]),
-    ("rop", &["trace", "picture", "resolve"]),
-    ("design", &["rop", "trace", "resolve"]),
-    ("gpu", &["scene", "capture", "trace", "picture", "rop", "design"]),
-    ("metrics", &["trace", "picture"]),
-    ("study", &["scene", "capture", "trace", "rop", "gpu", "design", "metrics", "picture"]),
-    ("report", &["study", "metrics", "picture"]),
-    (
-        "cli",
-        &[
-            "scene", "capture", "trace", "rop", "gpu", "design", "metrics", "picture", "study",
-            "report",
-        ],
-    ),
-];
+type Graph = BTreeMap<String, BTreeSet<String>>;
 
-const FOUNDATION: &[&str] = &["error", "param", "random", "output", "tile"];
-
-/// The crate's modules that a source text names, tests left out.
-fn imports(source: &str) -> Vec<String> {
-    let code = source.split("#[cfg(test)]").next().unwrap_or("");
-    let code: String =
-        code.lines().filter(|l| !l.trim_start().starts_with("//")).collect::<Vec<_>>().join("\n");
-    let named = code.split("crate::").skip(1).filter_map(|rest| {
-        let name: String =
-            rest.chars().take_while(|c| c.is_ascii_alphanumeric() || *c == '_').collect();
-        // Macros stand at the crate's root and belong to param.
-        (!rest[name.len()..].starts_with('!') && !name.is_empty()).then_some(name)
-    });
-    named.collect()
+/// What can be reached from `start`, itself left out unless a circle leads back to it.
+fn reached(graph: &Graph, start: &str) -> BTreeSet<String> {
+    let mut found = BTreeSet::new();
+    let mut open = vec![start.to_string()];
+    while let Some(node) = open.pop() {
+        for next in graph.get(&node).into_iter().flatten() {
+            if found.insert(next.clone()) {
+                open.push(next.clone());
+            }
+        }
+    }
+    found
 }
 
-/// Imports of `module` that the flow does not allow.
-fn against_the_flow(module: &str, source: &str) -> Vec<String> {
-    let allowed = FLOW.iter().find(|(name, _)| *name == module).expect(module).1;
-    imports(source)
-        .into_iter()
-        .filter(|name| {
-            name != module
-                && !FOUNDATION.contains(&name.as_str())
-                && !allowed.contains(&name.as_str())
-        })
-        .collect()
-}
-
-fn sources(folder: &Path) -> Vec<PathBuf> {
-    let mut files = Vec::new();
+/// The crates of the workspace, and which of them each depends on.
+fn crates() -> Graph {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("crates");
+    let mut graph = Graph::new();
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
-        if path.is_dir() {
-            files.extend(sources(&path));
-        } else if path.extension().is_some_and(|e| e == "rs") {
-            files.push(path);
-        }
+        let manifest = fs::read_to_string(path.join("Cargo.toml")).unwrap();
+        // What tests need may lie anywhere.
+        let manifest = manifest.split("[dev-dependencies]").next().unwrap();
+        let needs = manifest.lines().filter_map(|line| line.strip_prefix("screendoor-"));
+        let needs = needs.map(|l| l.split(['.', ' ', '=']).next().unwrap().to_string()).collect();
+        graph.insert(path.file_name().unwrap().to_string_lossy().into_owned(), needs);
     }
-    files
+    graph
 }
 
 #[test]
-fn every_import_follows_the_flow() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut seen = Vec::new();
-    for path in sources(&root) {
-        let relative = path.strip_prefix(&root).unwrap();
-        let first = relative.components().next().unwrap().as_os_str().to_string_lossy();
-        let module = first.trim_end_matches(".rs").to_string();
-        // Files of tests may look at anything.
-        if module == "lib" || module == "main" || relative.ends_with("tests.rs") {
+fn crates_know_only_what_lies_below_them() {
+    let graph = crates();
+    // A crate may know those that its row reaches, none else.
+    let order = ["trace", "scene", "rop", "designs", "gpu", "study", "report"];
+    for (i, name) in order.iter().enumerate() {
+        let above: BTreeSet<String> = order[i..].iter().map(|n| n.to_string()).collect();
+        let wrong: Vec<_> = reached(&graph, name).intersection(&above).cloned().collect();
+        assert!(wrong.is_empty(), "screendoor-{name} reaches {wrong:?}");
+    }
+    // Designs know no device and no scene, devices no study.
+    for (name, none_of) in [("designs", ["scene", "gpu"]), ("rop", ["scene", "designs"])] {
+        let reached = reached(&graph, name);
+        assert!(none_of.iter().all(|n| !reached.contains(*n)), "{name} reaches {reached:?}");
+    }
+    let known: BTreeSet<&str> = order.into_iter().chain(["xtask"]).collect();
+    assert_eq!(graph.keys().map(String::as_str).collect::<BTreeSet<_>>(), known);
+}
+
+/// Which files of `folder` each of them imports, by `use {prefix}::FILE::`.
+fn files(folder: &Path, prefix: &str) -> Graph {
+    let mut graph = Graph::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|e| e != "rs") {
             continue;
         }
-        let source = fs::read_to_string(&path).unwrap();
-        let wrong = against_the_flow(&module, &source);
-        assert!(wrong.is_empty(), "{} imports {wrong:?}", relative.display());
-        seen.push(module);
+        let name = path.file_stem().unwrap().to_string_lossy().into_owned();
+        graph.insert(name, imports(&fs::read_to_string(&path).unwrap(), prefix));
     }
-    for (module, _) in FLOW {
-        assert!(seen.iter().any(|m| m == module), "there is no module '{module}'");
+    graph
+}
+
+fn imports(source: &str, prefix: &str) -> BTreeSet<String> {
+    let code = source.lines().filter(|line| !line.trim_start().starts_with("//"));
+    let code = code.collect::<Vec<_>>().join("\n");
+    let after = code.split(prefix).skip(1).filter_map(|rest| rest.strip_prefix("::"));
+    let name = |rest: &str| -> String {
+        rest.chars().take_while(|c| c.is_ascii_alphanumeric() || *c == '_').collect()
+    };
+    after.map(name).filter(|name| !name.is_empty()).collect()
+}
+
+/// The files that need themselves by way of others.
+fn circles(graph: &Graph) -> Vec<&String> {
+    graph.keys().filter(|name| reached(graph, name).contains(*name)).collect()
+}
+
+#[test]
+fn the_contract_of_designs_has_no_circle() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("crates/rop/src/contract");
+    let graph = files(&folder, "crate::contract");
+    assert!(graph["port"].contains("design"), "imports are found: {graph:?}");
+    assert_eq!(circles(&graph), Vec::<&String>::new());
+    // Nor does it know what stands on it.
+    for file in graph.keys() {
+        let source = fs::read_to_string(folder.join(file).with_extension("rs")).unwrap();
+        let known = imports(&source, "crate");
+        let below = ["contract", "lanes", "resolve", "shader", "Shader"];
+        let above: Vec<_> = known.iter().filter(|n| !below.contains(&n.as_str())).collect();
+        assert!(above.is_empty(), "contract/{file}.rs imports {above:?}");
     }
 }
 
 #[test]
-fn the_flow_has_no_circle() {
-    for (i, (module, allowed)) in FLOW.iter().enumerate() {
-        for name in *allowed {
-            let place = FLOW.iter().position(|(m, _)| m == name);
-            assert!(place.is_some_and(|p| p < i), "{module} imports {name}, which comes later");
-        }
-    }
-}
-
-#[test]
-fn a_planted_import_is_found() {
-    let planted = "use crate::error::Result;\nuse crate::design::DESIGNS;\n";
-    assert_eq!(against_the_flow("rop", planted), ["design"]);
-    assert_eq!(against_the_flow("trace", "let s = crate::scene::load(\"x\");"), ["scene"]);
-    assert!(against_the_flow("rop", "crate::options! {}\nuse crate::trace::Trace;").is_empty());
+fn a_planted_circle_is_found() {
+    let planted = [("a", "use crate::kit::b::B;"), ("b", "// x\nuse crate::kit::c::C;"), ("c", "")];
+    let mut graph: Graph =
+        planted.iter().map(|(n, t)| (n.to_string(), imports(t, "crate::kit"))).collect();
+    assert_eq!(circles(&graph), Vec::<&String>::new());
+    graph.insert("b".to_string(), imports("use crate::kit::a::A;", "crate::kit"));
+    assert_eq!(circles(&graph), ["a", "b"]);
 }

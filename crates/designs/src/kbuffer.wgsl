@@ -1,4 +1,4 @@
-// Twin of src/design/kbuffer.rs: the nearest layers, sorted; what lies behind is dropped.
+// Twin of crates/designs/src/kbuffer.rs: the nearest layers, sorted; what lies behind is dropped.
 // uses: layered
 
 fn inner_draw(number: u32, f: Fragment, row: u32) {

@@ -1,4 +1,10 @@
 //! The designs, one file each, and their registry.
+//!
+//! They know no device, no scene and no study; the compiler says so:
+//!
+//! ```compile_fail
+//! use screendoor_gpu::Gpu;
+//! ```
 
 #![warn(missing_docs)]
 

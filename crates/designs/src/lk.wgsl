@@ -1,4 +1,4 @@
-// Twin of src/design/lk.rs: reference values of figure 4, a hash for each sample.
+// Twin of crates/designs/src/lk.rs: reference values of figure 4, a hash for each sample.
 // uses: over_opaque replay resolve stochastic tracked
 
 fn references_clear() {}

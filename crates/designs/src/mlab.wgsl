@@ -1,4 +1,4 @@
-// Twin of src/design/mlab.rs: layers sorted as they come; of one too many the last two are
+// Twin of crates/designs/src/mlab.rs: layers sorted as they come; of one too many the last two are
 // merged.
 // uses: layered
 

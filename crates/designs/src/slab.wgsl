@@ -1,4 +1,4 @@
-// Twin of src/design/slab.rs: a k-buffer that fragments enter as likely as stochastic
+// Twin of crates/designs/src/slab.rs: a k-buffer that fragments enter as likely as stochastic
 // transparency would show them; visibilities in single precision.
 // uses: layers opacity over_opaque random replay subset wide
 

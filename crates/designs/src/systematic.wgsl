@@ -1,4 +1,4 @@
-// Twin of src/design/systematic.rs: evenly spaced reference values.
+// Twin of crates/designs/src/systematic.rs: evenly spaced reference values.
 // uses: dither over_opaque replay resolve stochastic tracked
 
 // The last phase of the surface, and whether it has one. Where places are counted, ξ.

@@ -1,4 +1,4 @@
-// Twin of src/design/wboit.rs: the fragments' mean, weighted by depth and alpha, in single
+// Twin of crates/designs/src/wboit.rs: the fragments' mean, weighted by depth and alpha, in single
 // precision.
 // uses: arithmetic colour fragment over_opaque replay state view_depth
 

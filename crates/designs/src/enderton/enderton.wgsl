@@ -1,4 +1,4 @@
-// Twin of src/design/enderton/mod.rs: each fragment writes a random share of its samples.
+// Twin of crates/designs/src/enderton/mod.rs: each fragment writes a random share of its samples.
 // uses: arithmetic dither opacity over_opaque pixel_order replay resolve round stochastic
 
 // What the design has no parameters for.

@@ -1,4 +1,4 @@
-// Twin of src/trace/fragment.rs and of what src/trace/batch.rs makes of columns.
+// Twin of crates/trace/src/trace/fragment.rs and of what crates/trace/src/trace/batch.rs makes of columns.
 // uses: bindings mask
 
 struct Fragment {

@@ -1,4 +1,4 @@
-// Figure 7 of src/rop/tracked.rs with a thread for each sample: those of a pixel do the same
+// Figure 7 of crates/rop/src/stochastic/tracked.rs with a thread for each sample: those of a pixel do the same
 // but for what is their own sample's. `place_in_lanes` is the file's that uses this one:
 // threads look at each other's depths there.
 // uses: colour replay tracked

@@ -1,4 +1,4 @@
-// Sets of up to 32 samples: SampleMask of src/trace/fragment.rs in one word.
+// Sets of up to 32 samples: SampleMask of crates/trace/src/trace/fragment.rs in one word.
 
 alias Mask = u32;
 

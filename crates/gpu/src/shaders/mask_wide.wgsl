@@ -1,4 +1,4 @@
-// Sets of up to 64 samples: SampleMask of src/trace/fragment.rs in two words.
+// Sets of up to 64 samples: SampleMask of crates/trace/src/trace/fragment.rs in two words.
 // uses: wide
 
 alias Mask = Wide;

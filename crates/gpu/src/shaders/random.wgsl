@@ -1,4 +1,4 @@
-// Twin of src/random.rs: randomness as a pure function of its inputs.
+// Twin of crates/trace/src/random.rs: randomness as a pure function of its inputs.
 
 fn mix(word: u32) -> u32 {
     var x = word;

@@ -1,4 +1,4 @@
-// Sets of up to 64 members, as SampleMask of src/trace/fragment.rs: two words, the lower first.
+// Sets of up to 64 members, as SampleMask of crates/trace/src/trace/fragment.rs: two words, the lower first.
 
 alias Wide = vec2<u32>;
 

@@ -1,4 +1,4 @@
-// Twin of src/rop/view_depth.rs, in single precision.
+// Twin of crates/rop/src/blended/view_depth.rs, in single precision.
 
 // ViewDepth::at.
 fn view_depth(z: u32) -> f32 {

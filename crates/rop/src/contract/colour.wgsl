@@ -1,4 +1,4 @@
-// Twin of src/rop/colour.rs: colours as they are stored. In integers, as drivers round
+// Twin of crates/rop/src/contract/colour.rs: colours as they are stored. In integers, as drivers round
 // to half precision as they like. CHANNEL_BITS is the width of a channel.
 // uses: arithmetic
 

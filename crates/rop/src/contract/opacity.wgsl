@@ -1,4 +1,4 @@
-// Twin of src/rop/opacity.rs: the opacity test in integers.
+// Twin of crates/rop/src/contract/opacity.rs: the opacity test in integers.
 // uses: arithmetic
 
 // T = ⌈α·2^32⌉: its lower word, and whether it is 2^32.

@@ -1,4 +1,4 @@
-// Twin of src/rop/over_opaque.rs: opaque geometry first, transparent geometry over it.
+// Twin of crates/rop/src/contract/over_opaque.rs: opaque geometry first, transparent geometry over it.
 // `inner_clear`, `inner_load`, `inner_store`, `inner_draw` and `inner_end_pass` are the design's.
 // uses: colour fragment state
 

@@ -1,4 +1,4 @@
-// Twin of src/rop/samples.rs: the multisample buffer of one pixel, and the order of samples.
+// Twin of crates/rop/src/contract/samples.rs: the multisample buffer of one pixel, and the order of samples.
 // Colours wait until the pixel's fragments have all been drawn: until then it is known
 // which row won each sample.
 // uses: bindings colour fragment state

@@ -1,4 +1,4 @@
-// Twin of src/rop/layers.rs: layers of a pixel in the order of their depths. `LAYER_ROOM` is
+// Twin of crates/rop/src/layered/layers.rs: layers of a pixel in the order of their depths. `LAYER_ROOM` is
 // the most that are ever held.
 // uses: arithmetic colour fragment state
 

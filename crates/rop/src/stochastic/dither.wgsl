@@ -1,4 +1,4 @@
-// Twin of src/rop/dither.rs: one number a pixel and surface, even over neighbours.
+// Twin of crates/rop/src/stochastic/dither.rs: one number a pixel and surface, even over neighbours.
 // uses: bindings random reference_value
 
 const TILE: u32 = 64u;

@@ -1,4 +1,4 @@
-// Twin of src/rop/pixel_order.rs: numbering the pixels of a frame.
+// Twin of crates/rop/src/stochastic/pixel_order.rs: numbering the pixels of a frame.
 // uses: bindings
 
 fn pixel_index(x: u32, y: u32) -> u32 {

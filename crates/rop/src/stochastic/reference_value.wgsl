@@ -1,4 +1,4 @@
-// Twin of src/rop/reference_value.rs: opacity reference values.
+// Twin of crates/rop/src/stochastic/reference_value.rs: opacity reference values.
 // uses: random
 
 struct ReferenceKey {

@@ -1,4 +1,4 @@
-// Rounds and methods of src/rop/stochastic.rs.
+// Rounds and methods of crates/rop/src/stochastic/methods.rs.
 // uses: bindings random
 
 struct Round {

@@ -1,4 +1,4 @@
-// Twin of src/rop/stochastic.rs: what is made of the chosen samples. `sampler_clear`,
+// Twin of crates/rop/src/stochastic/methods.rs: what is made of the chosen samples. `sampler_clear`,
 // `sampler_load`, `sampler_store` and `choose` are the sampler's.
 // uses: arithmetic colour round samples
 
@@ -131,7 +131,7 @@ fn inner_end_pass(number: u32) {
     sums_store();
 }
 
-// box_filter of src/resolve/mod.rs. Samples are a power of two: products with their share
+// box_filter of crates/rop/src/resolve.rs. Samples are a power of two: products with their share
 // are exact.
 fn resolve_pixel() -> vec3<f32> {
     let share = 1.0 / f32(SAMPLES);

@@ -1,4 +1,4 @@
-// Twin of src/rop/subset.rs: how likely random subsets of coverage bits are to be seen.
+// Twin of crates/rop/src/stochastic/subset.rs: how likely random subsets of coverage bits are to be seen.
 
 // 1 − (s)_t / (b)_t for t ≤ s, and 1 for t > s.
 fn visible_stratified(b: u32, s: u32, t: u32) -> f32 {

@@ -1,4 +1,4 @@
-// Twin of src/rop/surface.rs: tracking of surfaces.
+// Twin of crates/rop/src/stochastic/surface.rs: tracking of surfaces.
 // uses: fragment state
 
 var<private> covered: Mask;

@@ -1,4 +1,4 @@
-// Twin of src/rop/tracked.rs: figure 7 of Laine and Karras (2011) with any reference values.
+// Twin of crates/rop/src/stochastic/tracked.rs: figure 7 of Laine and Karras (2011) with any reference values.
 // `references_clear`, `references_load`, `references_store`, `references_start`,
 // `references_begin` and `reference_of` are the design's.
 // uses: opacity pixel_order reference_value round samples surface
