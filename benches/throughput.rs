@@ -1,11 +1,10 @@
 //! Fragments per second of capture, trace reading and each design's replay.
 //!
 //! `cargo bench` runs all; `cargo bench -- replay/lk` a part. Every bench first
-//! checks what it is about to time against the hashes in `traces/`.
+//! checks what it is about to time against the hashes in `traces/`, or the plain text.
 
 mod common;
 
-use std::collections::HashMap;
 use std::hint::black_box;
 use std::path::Path;
 
@@ -14,7 +13,8 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use rayon::ThreadPoolBuilder;
 use screendoor::capture::{Capture, CaptureOptions};
 use screendoor::design::DESIGNS;
-use screendoor::rop::ReplayOptions;
+use screendoor::error::Result;
+use screendoor::rop::{ReplayOptions, Replayed, Which};
 use screendoor::trace::{Compression, Trace};
 
 /// The trace that is timed, and the scene it is made of (`traces/README.md`).
@@ -28,16 +28,6 @@ fn folder() -> &'static Path {
 
 fn open() -> Trace {
     Trace::open(folder().join(format!("{TRACE}.arrow"))).expect("the trace is in the tree")
-}
-
-/// Picture hashes by design and sample count.
-fn golden() -> HashMap<(String, u32), String> {
-    let text = std::fs::read_to_string(folder().join("golden.txt")).expect("it is in the tree");
-    let lines = text.lines().map(|line| line.split(' ').collect::<Vec<_>>());
-    lines
-        .filter(|words| words[0] == TRACE)
-        .map(|words| ((words[1].into(), words[2].parse().expect("a count")), words[4].into()))
-        .collect()
 }
 
 fn capture(c: &mut Criterion) {
@@ -75,7 +65,6 @@ fn read(c: &mut Criterion) {
 fn replay(c: &mut Criterion) {
     // Uncompressed: the designs are timed, not the decoder.
     let trace = stored(&open(), Compression::None);
-    let golden = golden();
     let mut group = c.benchmark_group("replay");
     group.throughput(Throughput::Elements(trace.rows()));
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
@@ -83,10 +72,14 @@ fn replay(c: &mut Criterion) {
         let design = entry.configure(&[]).expect("defaults are good");
         for samples in [4, 8, 16, 64] {
             let name = entry.info.name;
-            let run = || design.replay(&trace, samples, SEED, &ReplayOptions::default());
-            let picture = run().expect("it replays").picture;
-            let expected = golden.get(&(name.to_string(), samples)).expect("it is golden");
-            assert_eq!(&picture.hash(), expected, "{name} at {samples} has changed");
+            let with = |engine| {
+                let options = ReplayOptions { engine, ..ReplayOptions::default() };
+                design.replay(&trace, samples, SEED, &options)
+            };
+            let run = || with(Which::Fast);
+            let picture = |run: Result<Replayed>| run.expect("it replays").picture.hash();
+            let expected = picture(with(Which::Reference));
+            assert_eq!(picture(run()), expected, "{name} at {samples} is not the plain text");
             for threads in if threads > 1 { vec![1, threads] } else { vec![1] } {
                 let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
                 let id = BenchmarkId::new(name, format!("{samples} samples, {threads} threads"));
