@@ -14,7 +14,8 @@ const WIDTHS: [u32; 3] = [8, 16, 32];
 
 /// The designs that store colours: all but the reference.
 fn entries() -> impl Iterator<Item = &'static Entry> {
-    let entries = DESIGNS.iter().filter(|e| e.info.params.iter().any(|p| p.name == PARAM.name));
+    let entries =
+        DESIGNS.iter().filter(|e| e.info.params.iter().any(|p| p.name == PARAM.param.name));
     assert_eq!(entries.clone().count(), DESIGNS.len() - 1);
     entries
 }

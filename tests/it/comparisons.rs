@@ -4,6 +4,7 @@
 use std::collections::BTreeMap;
 
 use screendoor::design::{self as designs, Configured, DESIGNS};
+use screendoor::rop::layers::LAYERS;
 use screendoor::rop::{
     Blueprint, Design, Event, EventCounts, Frame, Listen, Probe, ReplayOptions, Site, Which,
 };
@@ -227,7 +228,7 @@ fn the_replay_passes_on_what_designs_tell() {
             // Whoever keeps more than one layer compares, and a listener that does not
             // hear of it counts something else.
             let layered = entry.info.params.iter().any(|p| p.name == "layers");
-            if layered && design.values().integer("layers") > 1 {
+            if layered && design.values().get(LAYERS) > 1 {
                 assert!(direct.layers_compared > 0, "{label}");
                 assert_ne!(told(&design, &trace, true), direct, "{label}");
             }

@@ -98,7 +98,7 @@ pub fn all_variants() -> Vec<Configured> {
 pub fn variants(entry: &Entry) -> Vec<Configured> {
     let mut settings: Vec<Vec<(String, String)>> = vec![Vec::new()];
     // The width of stored colours rounds, whatever is promised: tests/it/colour.rs.
-    for param in entry.info.params.iter().filter(|p| p.name != colour::PARAM.name) {
+    for param in entry.info.params.iter().filter(|p| p.name != colour::PARAM.param.name) {
         let values: Vec<String> = match param.kind {
             Kind::Flag => vec!["true".into(), "false".into()],
             Kind::Choice { options } => options.iter().map(|o| o.name.into()).collect(),

@@ -8,7 +8,7 @@ use screendoor_rop::{
     Probe, Promises, Site, Transparent, colour, network_comparators, over_opaque,
 };
 use screendoor_trace::error::Result;
-use screendoor_trace::param::{Param, Values};
+use screendoor_trace::param::{Typed, Values};
 use screendoor_trace::trace::Fragment;
 
 screendoor_trace::options! {
@@ -23,6 +23,8 @@ screendoor_trace::options! {
 /// The design's entry in the registry.
 pub struct ABuffer;
 
+const OVERFLOW: Typed<Overflow> = Typed::choice("overflow", "newest", "what a full list does");
+
 impl Blueprint for ABuffer {
     const INFO: Info = Info {
         name: "abuffer",
@@ -30,11 +32,11 @@ impl Blueprint for ABuffer {
         summary: "a bounded list of fragments as they come, sorted at the end",
         citation: "Carpenter: The A-buffer, an Antialiased Hidden Surface Method, SIGGRAPH 1984",
         params: &[
-            over_opaque::PARAM,
-            LAYERS,
-            Param::choice::<Overflow>("overflow", "newest", "what a full list does"),
-            COVERAGE,
-            colour::PARAM,
+            over_opaque::PARAM.param,
+            LAYERS.param,
+            OVERFLOW.param,
+            COVERAGE.param,
+            colour::PARAM.param,
         ],
         combinations: &["overflow=blend,coverage=share"],
     };
@@ -43,13 +45,13 @@ impl Blueprint for ABuffer {
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
         let layering = Layering::of(values, frame);
-        let inner = ABufferAt { overflow: values.choice("overflow"), layering };
+        let inner = ABufferAt { overflow: values.get(OVERFLOW), layering };
         Ok(OverOpaque::new(values, frame, over_opaque::of(values), inner))
     }
 
     fn promises(values: &Values) -> Promises {
         Promises {
-            order: match values.choice("overflow") {
+            order: match values.get(OVERFLOW) {
                 Overflow::Furthest => OrderPromise::Independent,
                 Overflow::Newest | Overflow::Blend => OrderPromise::Dependent,
             },

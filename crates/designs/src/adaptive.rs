@@ -32,7 +32,7 @@ impl Blueprint for Adaptive {
         family: Family::Layered,
         summary: "visibility over depth in few nodes, then a sum of all fragments by it",
         citation: "Salvi, Montgomery, Lefohn: Adaptive Transparency, HPG 2011",
-        params: &[over_opaque::PARAM, LAYERS, COVERAGE, colour::PARAM],
+        params: &[over_opaque::PARAM.param, LAYERS.param, COVERAGE.param, colour::PARAM.param],
         combinations: &[],
     };
 

@@ -20,7 +20,7 @@ impl Blueprint for AlphaToCoverage {
         family: Family::Stochastic,
         summary: "the same samples for the same alpha: layers hide each other (the known wrong answer)",
         citation: "OpenGL 4.6 specification, section 17.3.1 (GL_SAMPLE_ALPHA_TO_COVERAGE)",
-        params: &[depth_bits::PARAM, colour::PARAM],
+        params: &[depth_bits::PARAM.param, colour::PARAM.param],
         combinations: &[],
     };
 

@@ -19,7 +19,7 @@ impl Blueprint for Blend {
         family: Family::Blended,
         summary: "alpha blending in API order, sample by sample: the baseline of cost",
         citation: "Porter, Duff: Compositing Digital Images, SIGGRAPH 1984, operator over",
-        params: &[over_opaque::PARAM, colour::PARAM],
+        params: &[over_opaque::PARAM.param, colour::PARAM.param],
         combinations: &[],
     };
 

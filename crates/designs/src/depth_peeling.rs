@@ -13,7 +13,7 @@ use screendoor_rop::{
     OverOpaque, Probe, Promises, Site, Transparent, colour, over_opaque,
 };
 use screendoor_trace::error::Result;
-use screendoor_trace::param::{Param, Values};
+use screendoor_trace::param::{Typed, Values};
 use screendoor_trace::trace::{Fragment, SampleMask, Unorm32};
 
 screendoor_trace::options! {
@@ -27,18 +27,16 @@ screendoor_trace::options! {
 /// The design's entry in the registry.
 pub struct DepthPeeling;
 
+const TIES: Typed<Ties> =
+    Typed::choice("ties", "lost", "what becomes of fragments at equal depths");
+
 impl Blueprint for DepthPeeling {
     const INFO: Info = Info {
         name: "depth-peeling",
         family: Family::Layered,
         summary: "one pass for each layer, sample by sample; what lies behind the last is missing",
         citation: "Everitt: Interactive Order-Independent Transparency, NVIDIA, 2001",
-        params: &[
-            over_opaque::PARAM,
-            LAYERS,
-            Param::choice::<Ties>("ties", "lost", "what becomes of fragments at equal depths"),
-            colour::PARAM,
-        ],
+        params: &[over_opaque::PARAM.param, LAYERS.param, TIES.param, colour::PARAM.param],
         combinations: &[],
     };
 
@@ -49,7 +47,7 @@ impl Blueprint for DepthPeeling {
             frame: frame.clone(),
             store: ColourStore::of(values, frame),
             layers: room(values) as u32,
-            ties: values.choice("ties"),
+            ties: values.get(TIES),
         };
         Ok(OverOpaque::new(values, frame, over_opaque::of(values), inner))
     }

@@ -13,7 +13,7 @@ use screendoor_rop::{
     colour, depth_bits,
 };
 use screendoor_trace::error::Result;
-use screendoor_trace::param::{Param, Values};
+use screendoor_trace::param::{Typed, Values};
 use screendoor_trace::random::hash;
 use screendoor_trace::trace::{Fragment, SampleMask, Unorm32};
 
@@ -28,18 +28,17 @@ screendoor_trace::options! {
 /// The design's entry in the registry.
 pub struct HashedAlpha;
 
+const THRESHOLD: Typed<Each> =
+    Typed::choice("threshold", "sample", "for what a threshold is computed");
+const SCALE: Typed<f64> = Typed::real("scale", "1", (0.1, 16.0), "cells of the hash, in pixels");
+
 impl Blueprint for HashedAlpha {
     const INFO: Info = Info {
         name: "hashed-alpha",
         family: Family::Stochastic,
         summary: "an alpha test against a hash of where the fragment lies, at two scales",
         citation: "Wyman, McGuire: Hashed Alpha Testing, I3D 2017",
-        params: &[
-            Param::choice::<Each>("threshold", "sample", "for what a threshold is computed"),
-            Param::real("scale", "1", (0.1, 16.0), "cells of the hash, in pixels"),
-            depth_bits::PARAM,
-            colour::PARAM,
-        ],
+        params: &[THRESHOLD.param, SCALE.param, depth_bits::PARAM.param, colour::PARAM.param],
         combinations: &[],
     };
 
@@ -47,8 +46,8 @@ impl Blueprint for HashedAlpha {
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
         let sampler = HashedThreshold {
-            each: values.choice("threshold"),
-            scale: values.real("scale"),
+            each: values.get(THRESHOLD),
+            scale: values.get(SCALE),
             depth_in_pixels: f64::from(frame.grid.width().max(frame.grid.height()))
                 / 2_f64.powi(32),
         };

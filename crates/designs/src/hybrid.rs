@@ -20,7 +20,7 @@ impl Blueprint for Hybrid {
         family: Family::Layered,
         summary: "the nearest layers, sorted, before the weighted average of all others",
         citation: "Maule, Comba, Torchelsen, Bastos: Hybrid Transparency, I3D 2013",
-        params: &[over_opaque::PARAM, LAYERS, COVERAGE, colour::PARAM],
+        params: &[over_opaque::PARAM.param, LAYERS.param, COVERAGE.param, colour::PARAM.param],
         combinations: &[],
     };
 

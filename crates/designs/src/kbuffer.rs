@@ -21,7 +21,7 @@ impl Blueprint for KBuffer {
         family: Family::Layered,
         summary: "the nearest layers, sorted; what lies behind them is dropped",
         citation: "Bavoil, Callahan, Lefohn, Comba, Silva: Multi-Fragment Effects on the GPU using the k-Buffer, I3D 2007",
-        params: &[over_opaque::PARAM, LAYERS, COVERAGE, colour::PARAM],
+        params: &[over_opaque::PARAM.param, LAYERS.param, COVERAGE.param, colour::PARAM.param],
         combinations: &[],
     };
 

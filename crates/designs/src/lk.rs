@@ -31,19 +31,19 @@ impl Blueprint for LaineKarras {
         summary: "surface tracking, samples sorted by stored depth, hashed reference values",
         citation: "Laine, Karras: Stratified Sampling for Stochastic Transparency, EGSR 2011",
         params: &[
-            SORT,
-            COMPACT,
-            SURFACES,
-            TRACK,
-            PIXEL_ORDER,
-            REFERENCE,
-            PREHASH,
-            METHOD,
-            ROUNDS,
-            STRATA,
-            OPAQUE,
-            depth_bits::PARAM,
-            colour::PARAM,
+            SORT.param,
+            COMPACT.param,
+            SURFACES.param,
+            TRACK.param,
+            PIXEL_ORDER.param,
+            REFERENCE.param,
+            PREHASH.param,
+            METHOD.param,
+            ROUNDS.param,
+            STRATA.param,
+            OPAQUE.param,
+            depth_bits::PARAM.param,
+            colour::PARAM.param,
         ],
         combinations: &COMBINATIONS,
     };
@@ -51,7 +51,7 @@ impl Blueprint for LaineKarras {
     type At<const N: usize> = Stochastic<TrackedSampler<Hashed, N>, N>;
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
-        let references = Hashed(values.choice(REFERENCE.name));
+        let references = Hashed(values.get(REFERENCE));
         stochastic::with_methods(values, frame, TrackedSampler::new(values, frame, references))
     }
 
@@ -71,7 +71,7 @@ impl Blueprint for LaineKarras {
             let sampler = FastTracked::<_, _, N>::new(values, Published, PublishedHash);
             return Ok(Some(Box::new(FastEngine::new(plain, sampler, level))));
         }
-        let references = Hashed(values.choice(REFERENCE.name));
+        let references = Hashed(values.get(REFERENCE));
         let sampler = FastTracked::<_, _, N>::new(values, Given::of(values), references);
         Ok(Some(Box::new(FastEngine::new(plain, sampler, level))))
     }
@@ -84,7 +84,7 @@ impl Blueprint for LaineKarras {
     }
 
     fn promises(values: &Values) -> Promises {
-        let reference: Reference = values.choice(REFERENCE.name);
+        let reference: Reference = values.get(REFERENCE);
         // Independent values break the link between a surface's samples.
         let by_chance = reference != Reference::White && chance_decides_surfaces(values);
         // Without scrambling, a pixel's surfaces share their reference values.
@@ -95,7 +95,7 @@ impl Blueprint for LaineKarras {
             // Unscrambled values still share out each stored surface evenly, as long as
             // its samples are numbered in a row.
             consistent: Promise::always_if(
-                apart && (scrambled || (values.flag(COMPACT.name) && values.flag(SORT.name))),
+                apart && (scrambled || (values.get(COMPACT) && values.get(SORT))),
             ),
             order: OrderPromise::Dependent,
             exact_opaque: OpaquePromise::Always,

@@ -9,11 +9,27 @@ use screendoor_rop::{
     Transparent, ViewDepth, accumulators, colour, over_opaque, view_depth,
 };
 use screendoor_trace::error::Result;
-use screendoor_trace::param::{Param, Values};
+use screendoor_trace::param::{Typed, Values};
 use screendoor_trace::trace::Fragment;
 
 /// The design's entry in the registry.
 pub struct MomentBased;
+
+const MOMENTS: Typed<MomentCount> =
+    Typed::choice("moments", "4", "power moments beside the zeroth");
+const BIAS: Typed<f64> = Typed::real(
+    "bias",
+    "1",
+    (0.1, 10.0),
+    "how far moments are drawn towards those of a fixed measure, in units of \
+     5e-7, 5e-6, 5e-5 for 4, 6, 8 moments",
+);
+const OVERESTIMATION: Typed<f64> = Typed::real(
+    "overestimation",
+    "0.25",
+    (0.0, 1.0),
+    "the share counted as before a fragment of what may lie where it lies",
+);
 
 impl Blueprint for MomentBased {
     const INFO: Info = Info {
@@ -22,26 +38,15 @@ impl Blueprint for MomentBased {
         summary: "moment-based: two passes of sums, the transmittance between them from power moments",
         citation: "Münstermann, Krumpen, Klein, Peters: Moment-Based Order-Independent Transparency, PACM CGIT 1(1), 2018",
         params: &[
-            Param::choice::<MomentCount>("moments", "4", "power moments beside the zeroth"),
-            Param::real(
-                "bias",
-                "1",
-                (0.1, 10.0),
-                "how far moments are drawn towards those of a fixed measure, in units of \
-                 5e-7, 5e-6, 5e-5 for 4, 6, 8 moments",
-            ),
-            Param::real(
-                "overestimation",
-                "0.25",
-                (0.0, 1.0),
-                "the share counted as before a fragment of what may lie where it lies",
-            ),
-            view_depth::NEAR,
-            view_depth::RANGE,
-            view_depth::LENS,
-            accumulators::PARAM,
-            over_opaque::PARAM,
-            colour::PARAM,
+            MOMENTS.param,
+            BIAS.param,
+            OVERESTIMATION.param,
+            view_depth::NEAR.param,
+            view_depth::RANGE.param,
+            view_depth::LENS.param,
+            accumulators::PARAM.param,
+            over_opaque::PARAM.param,
+            colour::PARAM.param,
         ],
         combinations: &["moments=8,coverage=share", "moments=8,bias=0.1"],
     };
@@ -50,9 +55,9 @@ impl Blueprint for MomentBased {
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
         let inner = MomentBasedAt {
-            moments: values.choice("moments"),
-            bias: values.real("bias"),
-            overestimation: values.real("overestimation"),
+            moments: values.get(MOMENTS),
+            bias: values.get(BIAS),
+            overestimation: values.get(OVERESTIMATION),
             depth: ViewDepth::of(values),
             coverage: accumulators::of(values),
             store: ColourStore::of(values, frame),

@@ -21,7 +21,7 @@ impl Blueprint for Mlab {
         family: Family::Layered,
         summary: "layers sorted as they come; of one too many the last two are merged",
         citation: "Salvi, Vaidyanathan: Multi-Layer Alpha Blending, I3D 2014",
-        params: &[over_opaque::PARAM, LAYERS, COVERAGE, colour::PARAM],
+        params: &[over_opaque::PARAM.param, LAYERS.param, COVERAGE.param, colour::PARAM.param],
         combinations: &[],
     };
 

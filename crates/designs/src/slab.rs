@@ -45,7 +45,7 @@ use screendoor_rop::{
     visible_stratified,
 };
 use screendoor_trace::error::Result;
-use screendoor_trace::param::{Param, Values};
+use screendoor_trace::param::{Typed, Values};
 use screendoor_trace::random::hash;
 use screendoor_trace::trace::{Fragment, SampleMask, Unorm32};
 
@@ -76,6 +76,22 @@ screendoor_trace::options! {
 /// The design's entry in the registry.
 pub struct Slab;
 
+const BITS: Typed<i64> =
+    Typed::integer("bits", "16", (0, 64), "virtual coverage bits b; 0: without bound");
+const OPACITY: Typed<Opacity> =
+    Typed::choice("opacity", "continuous", "how layers keep their opacity");
+const INSERTION: Typed<Insertion> =
+    Typed::choice("insertion", "stratified", "how likely fragments enter");
+const NORMALISE: Typed<Normalise> = Typed::choice(
+    "normalise",
+    "both",
+    "what a second pass adds up (Enderton et al. 2011, sections 3.3 and 3.4)",
+);
+const HIDDEN: Typed<Hidden> =
+    Typed::choice("hidden", "kept", "what becomes of layers wholly hidden");
+const WEIGH: Typed<bool> =
+    Typed::flag("weigh", false, "divide alpha by the probability to enter (continuous)");
+
 impl Blueprint for Slab {
     const INFO: Info = Info {
         name: "slab",
@@ -83,20 +99,16 @@ impl Blueprint for Slab {
         summary: "a k-buffer that fragments enter as likely as stochastic transparency would show them",
         citation: "Wyman: Stochastic Layered Alpha Blending, SIGGRAPH Talks 2016",
         params: &[
-            over_opaque::PARAM,
-            LAYERS,
-            Param::integer("bits", "16", (0, 64), "virtual coverage bits b; 0: without bound"),
-            Param::choice::<Opacity>("opacity", "continuous", "how layers keep their opacity"),
-            Param::choice::<Insertion>("insertion", "stratified", "how likely fragments enter"),
-            Param::choice::<Normalise>(
-                "normalise",
-                "both",
-                "what a second pass adds up (Enderton et al. 2011, sections 3.3 and 3.4)",
-            ),
-            Param::choice::<Hidden>("hidden", "kept", "what becomes of layers wholly hidden"),
-            Param::flag("weigh", false, "divide alpha by the probability to enter (continuous)"),
-            COVERAGE,
-            colour::PARAM,
+            over_opaque::PARAM.param,
+            LAYERS.param,
+            BITS.param,
+            OPACITY.param,
+            INSERTION.param,
+            NORMALISE.param,
+            HIDDEN.param,
+            WEIGH.param,
+            COVERAGE.param,
+            colour::PARAM.param,
         ],
         combinations: &[
             "opacity=discrete,normalise=none",
@@ -111,18 +123,18 @@ impl Blueprint for Slab {
     type At<const N: usize> = OverOpaque<SlabAt<N>, N>;
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
-        let (columns, bits) = (Columns::of(values, frame), values.integer("bits") as u32);
-        let opacity = if bits == 0 { Opacity::Continuous } else { values.choice("opacity") };
+        let (columns, bits) = (Columns::of(values, frame), values.get(BITS) as u32);
+        let opacity = if bits == 0 { Opacity::Continuous } else { values.get(OPACITY) };
         let inner = SlabAt {
             columns,
             seed: frame.seed,
             room: room(values),
             bits,
             opacity,
-            insertion: values.choice("insertion"),
-            normalise: values.choice("normalise"),
-            hidden: values.choice("hidden"),
-            weigh: values.flag("weigh"),
+            insertion: values.get(INSERTION),
+            normalise: values.get(NORMALISE),
+            hidden: values.get(HIDDEN),
+            weigh: values.get(WEIGH),
         };
         Ok(OverOpaque::new(values, frame, over_opaque::of(values), inner))
     }
@@ -135,18 +147,18 @@ impl Blueprint for Slab {
     }
 
     fn promises(values: &Values) -> Promises {
-        let bits = values.integer("bits");
+        let bits = values.get(BITS);
         // Visible layers in a single column are never more than bits: none is dropped
         // that would be seen.
-        let complete = values.choice::<Opacity>("opacity") == Opacity::Discrete
-            && values.choice::<Hidden>("hidden") == Hidden::Removed
-            && values.integer(LAYERS.name) >= bits
-            && values.choice::<Coverage>(COVERAGE.name) == Coverage::Share;
-        let unsummed = values.choice::<Normalise>("normalise") == Normalise::None;
+        let complete = values.get(OPACITY) == Opacity::Discrete
+            && values.get(HIDDEN) == Hidden::Removed
+            && values.get(LAYERS) >= bits
+            && values.get(COVERAGE) == Coverage::Share;
+        let unsummed = values.get(NORMALISE) == Normalise::None;
         Promises {
             // What finds no layer before it enters whatever came earlier, and where there
             // is room for one alone, the nearest such stays.
-            order: match (bits == 0 || complete || values.integer(LAYERS.name) == 1, unsummed) {
+            order: match (bits == 0 || complete || values.get(LAYERS) == 1, unsummed) {
                 (true, true) => OrderPromise::Independent,
                 (true, false) => OrderPromise::UpToRounding,
                 (false, _) => OrderPromise::Dependent,

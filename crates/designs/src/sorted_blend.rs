@@ -29,7 +29,7 @@ impl Blueprint for SortedBlend {
         family: Family::Blended,
         summary: "alpha blending of primitives sorted far to near by the application, each by its mean depth",
         citation: "Newell, Newell, Sancha: A Solution to the Hidden Surface Problem, ACM 1972, without its splitting",
-        params: &[over_opaque::PARAM, colour::PARAM],
+        params: &[over_opaque::PARAM.param, colour::PARAM.param],
         combinations: &[],
     };
 

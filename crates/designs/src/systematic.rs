@@ -24,7 +24,7 @@ use screendoor_rop::{
     Stochastic, colour, depth_bits,
 };
 use screendoor_trace::error::Result;
-use screendoor_trace::param::{Param, Values};
+use screendoor_trace::param::{Typed, Values};
 
 screendoor_trace::options! {
     /// What the place of a sample in its surface is counted in.
@@ -34,9 +34,9 @@ screendoor_trace::options! {
     }
 }
 
-const PHASE: Param = Param::choice::<Phase>("phase", "sum", "how the samples of a surface follow");
-const DITHER: Param =
-    Param::choice::<Dither>("dither", "sequence", "how xi is spread over the pixels");
+const PHASE: Typed<Phase> = Typed::choice("phase", "sum", "how the samples of a surface follow");
+const DITHER: Typed<Dither> =
+    Typed::choice("dither", "sequence", "how xi is spread over the pixels");
 
 /// The design's entry in the registry.
 pub struct Systematic;
@@ -48,21 +48,21 @@ impl Blueprint for Systematic {
         summary: "as lk, with one random number a surface and evenly spaced reference values",
         citation: "screendoor's own: Laine, Karras 2011 with systematic sampling (Madow: On the Theory of Systematic Sampling II, 1949)",
         params: &[
-            PHASE,
-            DITHER,
-            SORT,
-            COMPACT,
-            SURFACES,
-            TRACK,
-            PIXEL_ORDER,
-            REFERENCE,
-            PREHASH,
-            METHOD,
-            ROUNDS,
-            STRATA,
-            OPAQUE,
-            depth_bits::PARAM,
-            colour::PARAM,
+            PHASE.param,
+            DITHER.param,
+            SORT.param,
+            COMPACT.param,
+            SURFACES.param,
+            TRACK.param,
+            PIXEL_ORDER.param,
+            REFERENCE.param,
+            PREHASH.param,
+            METHOD.param,
+            ROUNDS.param,
+            STRATA.param,
+            OPAQUE.param,
+            depth_bits::PARAM.param,
+            colour::PARAM.param,
         ],
         combinations: &COMBINATIONS,
     };
@@ -106,14 +106,13 @@ impl Blueprint for Systematic {
     }
 
     fn promises(values: &Values) -> Promises {
-        let scrambled = values.choice::<Dither>(DITHER.name) != Dither::Sequence
-            || values.choice::<Reference>(REFERENCE.name).scrambles();
+        let scrambled = values.get(DITHER) != Dither::Sequence || values.get(REFERENCE).scrambles();
         let apart = depth_bits::tells_apart(values);
         let basic = Promises {
             unbiased: Promise::always_if(apart && scrambled && !chance_decides_surfaces(values)),
             // Unsorted, one surface's evenly spaced samples fall upon those of the one
             // before it in the same way however many there are.
-            consistent: Promise::always_if(apart && values.flag(SORT.name)),
+            consistent: Promise::always_if(apart && values.get(SORT)),
             order: OrderPromise::Dependent,
             exact_opaque: OpaquePromise::Always,
             seeded: true,
@@ -140,9 +139,9 @@ pub struct Evenly {
 impl Evenly {
     fn of(values: &Values) -> Self {
         Evenly {
-            phase: values.choice(PHASE.name),
-            dither: values.choice(DITHER.name),
-            reference: values.choice(REFERENCE.name),
+            phase: values.get(PHASE),
+            dither: values.get(DITHER),
+            reference: values.get(REFERENCE),
         }
     }
 }

@@ -9,7 +9,7 @@ use screendoor_rop::{
     Site, Transparent, ViewDepth, accumulators, colour, over_opaque, view_depth,
 };
 use screendoor_trace::error::Result;
-use screendoor_trace::param::{Param, Values};
+use screendoor_trace::param::{Typed, Values};
 use screendoor_trace::trace::{Fragment, Unorm32};
 
 screendoor_trace::options! {
@@ -46,6 +46,9 @@ fn raised(x: f64, power: u32) -> f64 {
 /// The design's entry in the registry.
 pub struct WeightedBlended;
 
+const WEIGHT: Typed<Weight> =
+    Typed::choice("weight", "eq7", "a fragment's weight (the paper's equations)");
+
 impl Blueprint for WeightedBlended {
     const INFO: Info = Info {
         name: "wboit",
@@ -53,13 +56,13 @@ impl Blueprint for WeightedBlended {
         summary: "weighted blended: the fragments' mean, weighted by depth and alpha, in one pass of sums",
         citation: "McGuire, Bavoil: Weighted Blended Order-Independent Transparency, JCGT 2(2), 2013",
         params: &[
-            Param::choice::<Weight>("weight", "eq7", "a fragment's weight (the paper's equations)"),
-            view_depth::NEAR,
-            view_depth::RANGE,
-            view_depth::LENS,
-            accumulators::PARAM,
-            over_opaque::PARAM,
-            colour::PARAM,
+            WEIGHT.param,
+            view_depth::NEAR.param,
+            view_depth::RANGE.param,
+            view_depth::LENS.param,
+            accumulators::PARAM.param,
+            over_opaque::PARAM.param,
+            colour::PARAM.param,
         ],
         combinations: &["weight=one,coverage=share", "coverage=share,opaque=together"],
     };
@@ -68,7 +71,7 @@ impl Blueprint for WeightedBlended {
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
         let inner = WeightedBlendedAt {
-            weight: values.choice("weight"),
+            weight: values.get(WEIGHT),
             depth: ViewDepth::of(values),
             coverage: accumulators::of(values),
             store: ColourStore::of(values, frame),

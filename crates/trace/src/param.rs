@@ -6,6 +6,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::marker::PhantomData;
 
 #[doc(hidden)]
 pub use serde;
@@ -64,41 +65,6 @@ pub struct Choice {
 }
 
 impl Param {
-    /// A `true`/`false` parameter.
-    pub const fn flag(name: &'static str, default: bool, help: &'static str) -> Self {
-        Param { name, default: if default { "true" } else { "false" }, kind: Kind::Flag, help }
-    }
-
-    /// A parameter whose options are those of the enumeration `C`.
-    pub const fn choice<C: Options>(
-        name: &'static str,
-        default: &'static str,
-        help: &'static str,
-    ) -> Self {
-        Param { name, default, kind: Kind::Choice { options: C::CHOICES }, help }
-    }
-
-    /// A whole number in `min..=max`; `default` is written as text so that the
-    /// declaration reads as the command line does.
-    pub const fn integer(
-        name: &'static str,
-        default: &'static str,
-        (min, max): (i64, i64),
-        help: &'static str,
-    ) -> Self {
-        Param { name, default, kind: Kind::Integer { min, max }, help }
-    }
-
-    /// A number in `min..=max`.
-    pub const fn real(
-        name: &'static str,
-        default: &'static str,
-        (min, max): (f64, f64),
-        help: &'static str,
-    ) -> Self {
-        Param { name, default, kind: Kind::Real { min, max }, help }
-    }
-
     /// The values it takes, for a listing: `true|false`, `a|b|c`, `1..16`.
     pub fn values(&self) -> String {
         match self.kind {
@@ -137,6 +103,94 @@ impl Param {
                 _ => Err(bad()),
             },
         }
+    }
+}
+
+/// A parameter whose values are of the type `T`, as [`Values::get`] tells them.
+#[derive(Clone, Copy, Debug)]
+pub struct Typed<T> {
+    /// Its declaration.
+    pub param: Param,
+    values: PhantomData<fn() -> T>,
+}
+
+impl<T> Typed<T> {
+    const fn of(param: Param) -> Self {
+        Typed { param, values: PhantomData }
+    }
+}
+
+impl Typed<bool> {
+    /// A `true`/`false` parameter.
+    pub const fn flag(name: &'static str, default: bool, help: &'static str) -> Self {
+        Typed::of(Param {
+            name,
+            default: if default { "true" } else { "false" },
+            kind: Kind::Flag,
+            help,
+        })
+    }
+}
+
+impl<C: Options> Typed<C> {
+    /// A parameter whose options are those of the enumeration `C`.
+    pub const fn choice(name: &'static str, default: &'static str, help: &'static str) -> Self {
+        Typed::of(Param { name, default, kind: Kind::Choice { options: C::CHOICES }, help })
+    }
+}
+
+impl Typed<i64> {
+    /// A whole number in `min..=max`; `default` is written as text so that the
+    /// declaration reads as the command line does.
+    pub const fn integer(
+        name: &'static str,
+        default: &'static str,
+        (min, max): (i64, i64),
+        help: &'static str,
+    ) -> Self {
+        Typed::of(Param { name, default, kind: Kind::Integer { min, max }, help })
+    }
+}
+
+impl Typed<f64> {
+    /// A number in `min..=max`.
+    pub const fn real(
+        name: &'static str,
+        default: &'static str,
+        (min, max): (f64, f64),
+        help: &'static str,
+    ) -> Self {
+        Typed::of(Param { name, default, kind: Kind::Real { min, max }, help })
+    }
+}
+
+/// A type that values of parameters can have.
+pub trait Read: Sized {
+    /// The value, where it is of this type.
+    fn read(value: Value) -> Option<Self>;
+}
+
+impl Read for bool {
+    fn read(value: Value) -> Option<Self> {
+        if let Value::Flag(v) = value { Some(v) } else { None }
+    }
+}
+
+impl Read for i64 {
+    fn read(value: Value) -> Option<Self> {
+        if let Value::Integer(v) = value { Some(v) } else { None }
+    }
+}
+
+impl Read for f64 {
+    fn read(value: Value) -> Option<Self> {
+        if let Value::Real(v) = value { Some(v) } else { None }
+    }
+}
+
+impl<C: Options> Read for C {
+    fn read(value: Value) -> Option<Self> {
+        if let Value::Choice { index, .. } = value { C::ALL.get(index).copied() } else { None }
     }
 }
 
@@ -306,52 +360,16 @@ impl Values {
             .join(",")
     }
 
-    /// The value of a [`Kind::Flag`] parameter.
+    /// The value of a parameter.
     ///
     /// # Panics
-    /// Where the owner declares no such flag: a fault in the owner's own code.
-    pub fn flag(&self, name: &str) -> bool {
-        match self.values.get(name) {
-            Some(Value::Flag(v)) => *v,
-            other => self.undeclared("flag", name, other),
-        }
-    }
-
-    /// The value of a [`Kind::Choice`] parameter declared with the same `C`.
-    ///
-    /// # Panics
-    /// Where the owner declares no such choice: a fault in the owner's own code.
-    pub fn choice<C: Options>(&self, name: &str) -> C {
-        match self.values.get(name) {
-            Some(Value::Choice { index, .. }) if *index < C::ALL.len() => C::ALL[*index],
-            other => self.undeclared("choice", name, other),
-        }
-    }
-
-    /// The value of a [`Kind::Integer`] parameter.
-    ///
-    /// # Panics
-    /// Where the owner declares no such integer: a fault in the owner's own code.
-    pub fn integer(&self, name: &str) -> i64 {
-        match self.values.get(name) {
-            Some(Value::Integer(v)) => *v,
-            other => self.undeclared("integer", name, other),
-        }
-    }
-
-    /// The value of a [`Kind::Real`] parameter.
-    ///
-    /// # Panics
-    /// Where the owner declares no such number: a fault in the owner's own code.
-    pub fn real(&self, name: &str) -> f64 {
-        match self.values.get(name) {
-            Some(Value::Real(v)) => *v,
-            other => self.undeclared("real", name, other),
-        }
-    }
-
-    fn undeclared(&self, kind: &str, name: &str, found: Option<&Value>) -> ! {
-        panic!("{} declares no {kind} parameter '{name}' (found {found:?})", self.owner)
+    /// Where the owner does not declare it: a fault in the owner's own code.
+    pub fn get<T: Read>(&self, param: Typed<T>) -> T {
+        let name = param.param.name;
+        let found = self.values.get(name);
+        found.and_then(|value| T::read(*value)).unwrap_or_else(|| {
+            panic!("{} does not declare the parameter '{name}' so (found {found:?})", self.owner)
+        })
     }
 }
 
@@ -395,12 +413,11 @@ mod tests {
         pub enum Colour { Red = "red": "as a rose", Blue = "blue": "as the sky" }
     }
 
-    const PARAMS: &[Param] = &[
-        Param::flag("sort", true, "whether to sort"),
-        Param::choice::<Colour>("colour", "red", "which colour"),
-        Param::integer("count", "3", (1, 9), "how many"),
-        Param::real("alpha", "0.5", (0.0, 1.0), "opacity"),
-    ];
+    const SORT: Typed<bool> = Typed::flag("sort", true, "whether to sort");
+    const COLOUR: Typed<Colour> = Typed::choice("colour", "red", "which colour");
+    const COUNT: Typed<i64> = Typed::integer("count", "3", (1, 9), "how many");
+    const ALPHA: Typed<f64> = Typed::real("alpha", "0.5", (0.0, 1.0), "opacity");
+    const PARAMS: &[Param] = &[SORT.param, COLOUR.param, COUNT.param, ALPHA.param];
 
     fn resolve(text: &str) -> Result<Values> {
         let (owner, given) = parse_spec(text)?;
@@ -410,10 +427,10 @@ mod tests {
     #[test]
     fn defaults_and_settings() {
         let values = resolve("it:colour=blue,count=9").unwrap();
-        assert!(values.flag("sort"));
-        assert_eq!(values.choice::<Colour>("colour"), Colour::Blue);
-        assert_eq!(values.integer("count"), 9);
-        assert_eq!(values.real("alpha"), 0.5);
+        assert!(values.get(SORT));
+        assert_eq!(values.get(COLOUR), Colour::Blue);
+        assert_eq!(values.get(COUNT), 9);
+        assert_eq!(values.get(ALPHA), 0.5);
         assert_eq!(values.changes(PARAMS), "colour=blue,count=9");
     }
 

@@ -164,8 +164,11 @@ fn compare(before: &Outcome, after: &Outcome) -> bool {
             record.as_object().into_iter().flatten().map(|(key, _)| key.clone()).collect()
         };
         of_one.extend(keys(a).symmetric_difference(&keys(b)).cloned());
-        let wrong: Vec<_> =
-            keys(a).intersection(&keys(b)).filter(|k| a[k.as_str()] != b[k.as_str()]).cloned().collect();
+        let wrong: Vec<_> = keys(a)
+            .intersection(&keys(b))
+            .filter(|k| a[k.as_str()] != b[k.as_str()])
+            .cloned()
+            .collect();
         if !wrong.is_empty() {
             println!("  {id}: {}", wrong.join(", "));
             differing += 1;

@@ -15,7 +15,7 @@ use screendoor_rop::{
     Round, Sampler, Site, Stochastic, Threshold, colour, depth_bits, random_subset, stratified,
 };
 use screendoor_trace::error::Result;
-use screendoor_trace::param::{Param, Values};
+use screendoor_trace::param::{Typed, Values};
 use screendoor_trace::random::hash;
 use screendoor_trace::tile::TileGrid;
 use screendoor_trace::trace::{Fragment, MAX_SAMPLES, SampleMask, Unorm32};
@@ -49,6 +49,21 @@ screendoor_trace::options! {
 /// The design's entry in the registry.
 pub struct Enderton;
 
+const MASK: Typed<MaskRule> =
+    Typed::choice("mask", "stratified", "how a fragment's samples are chosen");
+const AMONG: Typed<Among> = Typed::choice("among", "passed", "which samples are chosen from");
+const DITHER: Typed<Dither> = Typed::choice(
+    "dither",
+    "white",
+    "how xi, which rounds the number of samples, is spread over pixels (section 3.1)",
+);
+const SEED_BY: Typed<SeedBy> =
+    Typed::choice("seed-by", "primitive", "what names a fragment's mask");
+const TABLE_WIDTH: Typed<i64> =
+    Typed::integer("table-width", "2047", (1, 65535), "masks for each alpha in the table");
+const ALPHA_BITS: Typed<i64> =
+    Typed::integer("alpha-bits", "10", (1, 16), "bits of alpha that the table tells apart");
+
 impl Blueprint for Enderton {
     const INFO: Info = Info {
         name: "enderton",
@@ -56,22 +71,18 @@ impl Blueprint for Enderton {
         summary: "each fragment writes a random share of its samples, stratified within the fragment",
         citation: "Enderton, Sintorn, Shirley, Luebke: Stochastic Transparency, TVCG 17(8), 2011",
         params: &[
-            Param::choice::<MaskRule>("mask", "stratified", "how a fragment's samples are chosen"),
-            Param::choice::<Among>("among", "passed", "which samples are chosen from"),
-            Param::choice::<Dither>(
-                "dither",
-                "white",
-                "how xi, which rounds the number of samples, is spread over pixels (section 3.1)",
-            ),
-            Param::choice::<SeedBy>("seed-by", "primitive", "what names a fragment's mask"),
-            Param::integer("table-width", "2047", (1, 65535), "masks for each alpha in the table"),
-            Param::integer("alpha-bits", "10", (1, 16), "bits of alpha that the table tells apart"),
-            METHOD,
-            ROUNDS,
-            STRATA,
-            OPAQUE,
-            depth_bits::PARAM,
-            colour::PARAM,
+            MASK.param,
+            AMONG.param,
+            DITHER.param,
+            SEED_BY.param,
+            TABLE_WIDTH.param,
+            ALPHA_BITS.param,
+            METHOD.param,
+            ROUNDS.param,
+            STRATA.param,
+            OPAQUE.param,
+            depth_bits::PARAM.param,
+            colour::PARAM.param,
         ],
         combinations: &COMBINATIONS_OF_ENDERTON,
     };
@@ -114,13 +125,12 @@ impl Blueprint for Enderton {
     fn promises(values: &Values) -> Promises {
         // What a fragment chooses follows from its primitive alone, unless it
         // chooses among the samples that earlier fragments have left it.
-        let mask: MaskRule = values.choice("mask");
-        let of_itself =
-            mask != MaskRule::Stratified || values.choice::<Among>("among") == Among::Covered;
+        let mask: MaskRule = values.get(MASK);
+        let of_itself = mask != MaskRule::Stratified || values.get(AMONG) == Among::Covered;
         let apart = depth_bits::tells_apart(values);
         // One object's surfaces share their masks, and so do fragments of one depth; a
         // table's alphas are rounded.
-        let own_masks = match values.choice::<SeedBy>("seed-by") {
+        let own_masks = match values.get(SEED_BY) {
             SeedBy::Primitive => Promise::Always,
             SeedBy::Depth => Promise::DistinctDepths,
             SeedBy::Object => Promise::Never,
@@ -129,7 +139,7 @@ impl Blueprint for Enderton {
             unbiased: Promise::always_if(apart && mask != MaskRule::Table).min(own_masks),
             // As far as the most samples that a pixel can have tell.
             consistent: Promise::always_if(
-                apart && (mask != MaskRule::Table || values.integer("alpha-bits") >= 8),
+                apart && (mask != MaskRule::Table || values.get(ALPHA_BITS) >= 8),
             )
             .min(own_masks),
             order: match apart && of_itself {
@@ -188,12 +198,12 @@ impl<const N: usize> EndertonSampler<N> {
     fn new(values: &Values, frame: &Frame) -> Self {
         EndertonSampler {
             grid: frame.grid,
-            mask: values.choice("mask"),
-            among: values.choice("among"),
-            dither: values.choice("dither"),
-            seed_by: values.choice("seed-by"),
-            table_width: values.integer("table-width") as u32,
-            alpha_levels: (1 << values.integer("alpha-bits")) - 1,
+            mask: values.get(MASK),
+            among: values.get(AMONG),
+            dither: values.get(DITHER),
+            seed_by: values.get(SEED_BY),
+            table_width: values.get(TABLE_WIDTH) as u32,
+            alpha_levels: (1 << values.get(ALPHA_BITS)) - 1,
         }
     }
 

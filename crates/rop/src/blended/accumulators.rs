@@ -1,7 +1,7 @@
 //! Sums over a pixel's fragments, for each of its samples or for the pixel.
 
 use crate::resolve::box_filter;
-use screendoor_trace::param::{Param, Values};
+use screendoor_trace::param::{Typed, Values};
 use screendoor_trace::trace::{Fragment, SampleMask};
 
 screendoor_trace::options! {
@@ -15,12 +15,12 @@ screendoor_trace::options! {
 /// The parameter's declaration. One sum a pixel takes a surface's pieces for layers
 /// one behind the other: wherever two triangles meet within a pixel, their common
 /// edge shows. So sums for each sample are the default.
-pub const PARAM: Param =
-    Param::choice::<Coverage>("coverage", "sample", "what is summed where a fragment ends");
+pub const PARAM: Typed<Coverage> =
+    Typed::choice("coverage", "sample", "what is summed where a fragment ends");
 
 /// The parameter's value.
 pub fn of(values: &Values) -> Coverage {
-    values.choice(PARAM.name)
+    values.get(PARAM)
 }
 
 impl Coverage {

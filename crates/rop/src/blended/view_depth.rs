@@ -5,7 +5,7 @@
 //! distance along the view axis are told so by parameters, in the units of their
 //! formulas.
 
-use screendoor_trace::param::{Param, Values};
+use screendoor_trace::param::{Typed, Values};
 use screendoor_trace::trace::Unorm32;
 
 screendoor_trace::options! {
@@ -18,13 +18,13 @@ screendoor_trace::options! {
 
 /// Where the near plane stands. By default the far plane stands twice as far, about as
 /// in a view that frames a scene with a common field of view.
-pub const NEAR: Param = Param::real("near", "10", (1e-3, 1e6), "view depth of the near plane");
+pub const NEAR: Typed<f64> = Typed::real("near", "10", (1e-3, 1e6), "view depth of the near plane");
 /// How far it is from there to the far plane.
-pub const RANGE: Param =
-    Param::real("range", "10", (1e-3, 1e6), "view depth from the near plane to the far plane");
+pub const RANGE: Typed<f64> =
+    Typed::real("range", "10", (1e-3, 1e6), "view depth from the near plane to the far plane");
 /// How depth grows between them.
-pub const LENS: Param =
-    Param::choice::<Lens>("lens", "perspective", "how depth grows between the planes");
+pub const LENS: Typed<Lens> =
+    Typed::choice("lens", "perspective", "how depth grows between the planes");
 
 /// What turns a stored depth into a view depth.
 #[derive(Clone, Copy, Debug)]
@@ -42,7 +42,7 @@ impl ViewDepth {
 
     /// As the parameters say.
     pub fn of(values: &Values) -> Self {
-        Self::new(values.real(NEAR.name), values.real(RANGE.name), values.choice(LENS.name))
+        Self::new(values.get(NEAR), values.get(RANGE), values.get(LENS))
     }
 
     /// The view depth of `z`, between those of the two planes.

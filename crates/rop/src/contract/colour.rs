@@ -3,7 +3,7 @@
 use half::f16;
 
 use crate::contract::frame::Frame;
-use screendoor_trace::param::{Param, Values};
+use screendoor_trace::param::{Typed, Values};
 
 screendoor_trace::options! {
     /// How wide a stored channel of a colour is.
@@ -16,7 +16,7 @@ screendoor_trace::options! {
 }
 
 /// The parameter's declaration.
-pub const PARAM: Param = Param::choice::<ColourWidth>(
+pub const PARAM: Typed<ColourWidth> = Typed::choice(
     "colour",
     "trace",
     "bits of each channel of a stored or summed colour, and of the alpha beside it",
@@ -35,7 +35,7 @@ impl ColourStore {
     /// As the parameter says, for the frame's trace.
     pub fn of(values: &Values, frame: &Frame) -> Self {
         let trace = if frame.colour_bits == 48 { ColourWidth::Half } else { ColourWidth::Single };
-        let width = match values.choice(PARAM.name) {
+        let width = match values.get(PARAM) {
             ColourWidth::Trace => trace,
             chosen => chosen,
         };

@@ -15,7 +15,7 @@ use crate::contract::promises::OpaquePromise;
 use crate::contract::samples::Samples;
 use crate::contract::words::{Constant, Declaration, OnDevice, PixelWords};
 use crate::resolve::box_filter;
-use screendoor_trace::param::{Param, Values};
+use screendoor_trace::param::{Typed, Values};
 use screendoor_trace::trace::{Fragment, SampleMask, Unorm32};
 
 screendoor_trace::options! {
@@ -27,12 +27,12 @@ screendoor_trace::options! {
 }
 
 /// The parameter's declaration.
-pub const PARAM: Param =
-    Param::choice::<Opaque>("opaque", "first", "how opaque fragments (alpha 1) are drawn");
+pub const PARAM: Typed<Opaque> =
+    Typed::choice("opaque", "first", "how opaque fragments (alpha 1) are drawn");
 
 /// The parameter's value.
 pub fn of(values: &Values) -> Opaque {
-    values.choice(PARAM.name)
+    values.get(PARAM)
 }
 
 /// Where the picture of opaque fragments is exact under a design that owes it to the

@@ -12,19 +12,19 @@ use crate::contract::event::Probe;
 use crate::contract::frame::{Frame, Site};
 use crate::contract::layout::Layout;
 use crate::contract::words::{Declaration, OnDevice, PixelWords};
-use screendoor_trace::param::{Param, Values};
+use screendoor_trace::param::{Typed, Values};
 use screendoor_trace::trace::{Fragment, SampleMask, Unorm32};
 
 /// Bits of a layer's depth.
 pub const DEPTH_BITS: u32 = 32;
 
 /// How many layers a pixel keeps.
-pub const LAYERS: Param =
-    Param::integer("layers", "8", (1, 32), "the most layers that a pixel keeps");
+pub const LAYERS: Typed<i64> =
+    Typed::integer("layers", "8", (1, 32), "the most layers that a pixel keeps");
 
 /// The value of [`LAYERS`].
 pub fn room(values: &Values) -> usize {
-    values.integer(LAYERS.name) as usize
+    values.get(LAYERS) as usize
 }
 
 screendoor_trace::options! {
@@ -36,8 +36,8 @@ screendoor_trace::options! {
 }
 
 /// How layers keep their coverage.
-pub const COVERAGE: Param =
-    Param::choice::<Coverage>("coverage", "mask", "how layers keep the samples that they cover");
+pub const COVERAGE: Typed<Coverage> =
+    Typed::choice("coverage", "mask", "how layers keep the samples that they cover");
 
 /// The columns in which the layers of a pixel of `N` samples are composited.
 #[derive(Clone, Copy, Debug)]
@@ -51,7 +51,7 @@ impl<const N: usize> Columns<N> {
     /// As the parameters [`COVERAGE`] and [`crate::colour::PARAM`] say.
     pub fn of(values: &Values, frame: &Frame) -> Self {
         let store = ColourStore::of(values, frame);
-        Columns { coverage: values.choice(COVERAGE.name), store }
+        Columns { coverage: values.get(COVERAGE), store }
     }
 
     /// How many there are.

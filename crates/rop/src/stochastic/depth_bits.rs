@@ -1,6 +1,6 @@
 //! The width of the depth buffer, a parameter of designs that have one.
 
-use screendoor_trace::param::{Param, Values};
+use screendoor_trace::param::{Typed, Values};
 
 screendoor_trace::options! {
     /// How many bits a stored depth has.
@@ -12,7 +12,7 @@ screendoor_trace::options! {
 }
 
 /// The parameter's declaration.
-pub const PARAM: Param = Param::choice::<DepthBits>("depth-bits", "32", "bits of a stored depth");
+pub const PARAM: Typed<DepthBits> = Typed::choice("depth-bits", "32", "bits of a stored depth");
 
 /// Whether all depths that the trace tells apart are told apart when stored. Where
 /// they are not, the surface drawn last hides one slightly nearer: no promise holds.
@@ -22,7 +22,7 @@ pub fn tells_apart(values: &Values) -> bool {
 
 /// The parameter's value: 32, 24 or 16.
 pub fn of(values: &Values) -> u32 {
-    match values.choice(PARAM.name) {
+    match values.get(PARAM) {
         DepthBits::Full => 32,
         DepthBits::Medium => 24,
         DepthBits::Narrow => 16,

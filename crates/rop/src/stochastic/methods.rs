@@ -22,7 +22,7 @@ use crate::contract::words::{Constant, Declaration, OnDevice, PixelWords};
 use crate::resolve::box_filter;
 use crate::stochastic::depth_bits;
 use screendoor_trace::error::Result;
-use screendoor_trace::param::{Param, Values};
+use screendoor_trace::param::{Typed, Values};
 use screendoor_trace::random::hash;
 use screendoor_trace::trace::{Fragment, SampleMask, Unorm32};
 
@@ -67,17 +67,17 @@ screendoor_trace::options! {
 }
 
 /// The parameters that all samplers with several methods share.
-pub const METHOD: Param =
-    Param::choice::<Method>("method", "basic", "what is made of the chosen samples");
+pub const METHOD: Typed<Method> =
+    Typed::choice("method", "basic", "what is made of the chosen samples");
 /// As [`METHOD`].
-pub const ROUNDS: Param =
-    Param::choice::<Rounds>("rounds", "1", "how often the samples are drawn (E section 3.5)");
+pub const ROUNDS: Typed<Rounds> =
+    Typed::choice("rounds", "1", "how often the samples are drawn (E section 3.5)");
 /// As [`METHOD`].
-pub const STRATA: Param =
-    Param::choice::<Strata>("strata", "round", "over what several rounds are stratified");
+pub const STRATA: Typed<Strata> =
+    Typed::choice("strata", "round", "over what several rounds are stratified");
 /// As [`METHOD`].
-pub const OPAQUE: Param = Param::choice::<Opaque>(
-    over_opaque::PARAM.name,
+pub const OPAQUE: Typed<Opaque> = Typed::choice(
+    over_opaque::PARAM.param.name,
     "first",
     "how opaque fragments are drawn; method basic draws them like all others",
 );
@@ -144,9 +144,9 @@ pub fn with_methods<S: Sampler<N>, const N: usize>(
     frame: &Frame,
     sampler: S,
 ) -> Result<Stochastic<S, N>> {
-    let method = values.choice(METHOD.name);
-    let rounds = 1 << values.choice::<Rounds>(ROUNDS.name) as u32;
-    let strata = values.choice(STRATA.name);
+    let method = values.get(METHOD);
+    let rounds = 1 << values.get(ROUNDS) as u32;
+    let strata = values.get(STRATA);
     let opaque = match method {
         Method::Basic => Opaque::Together,
         _ => over_opaque::of(values),
@@ -206,7 +206,7 @@ where
 /// equal depths as in front of each other: where they overlap, no number of samples or
 /// seeds brings those methods to the exact picture.
 pub fn promises(values: &Values, basic: Promises) -> Promises {
-    let method: Method = values.choice(METHOD.name);
+    let method: Method = values.get(METHOD);
     let together = over_opaque::of(values) == Opaque::Together;
     let sums = method != Method::Basic;
     // The strongest promise that the method leaves of the samples' own. Opaque fragments
@@ -234,15 +234,14 @@ pub fn promises(values: &Values, basic: Promises) -> Promises {
 /// Whether these settings draw opaque fragments in a pass of their own.
 pub fn draws_opaque_first(values: &Values) -> bool {
     let has = |name| values.iter().any(|(param, _)| param == name);
-    has(over_opaque::PARAM.name)
+    has(over_opaque::PARAM.param.name)
         && over_opaque::of(values) == Opaque::First
-        && !(has(METHOD.name) && values.choice::<Method>(METHOD.name) == Method::Basic)
+        && !(has(METHOD.param.name) && values.get(METHOD) == Method::Basic)
 }
 
 /// Whether several rounds are stratified together.
 pub fn strata_over_rounds(values: &Values) -> bool {
-    values.choice::<Strata>(STRATA.name) == Strata::All
-        && values.choice::<Rounds>(ROUNDS.name) != Rounds::One
+    values.get(STRATA) == Strata::All && values.get(ROUNDS) != Rounds::One
 }
 
 /// Draws transparent fragments as a [`Method`] says.

@@ -13,7 +13,7 @@ use crate::stochastic::methods::{Round, Sampler};
 use crate::stochastic::pixel_order::{PixelIndex, PixelOrder};
 use crate::stochastic::reference_value::{Reference, ReferenceKey};
 use crate::stochastic::surface::{CoveredMask, SurfaceRule, SurfaceTracker, Tracked};
-use screendoor_trace::param::{Param, Values};
+use screendoor_trace::param::{Typed, Values};
 use screendoor_trace::tile::TileGrid;
 use screendoor_trace::trace::{Fragment, SampleMask, Unorm32};
 
@@ -69,29 +69,29 @@ impl References for Hashed {
 }
 
 /// The parameters of [`TrackedSampler`].
-pub const SORT: Param =
-    Param::flag("sort", true, "number samples in the order of their stored depths (LK section 4)");
+pub const SORT: Typed<bool> =
+    Typed::flag("sort", true, "number samples in the order of their stored depths (LK section 4)");
 /// As [`SORT`].
-pub const COMPACT: Param = Param::flag(
+pub const COMPACT: Typed<bool> = Typed::flag(
     "compact",
     true,
     "test depth before numbering samples (LK figure 5b); off: when writing",
 );
 /// As [`SORT`].
-pub const SURFACES: Param =
-    Param::choice::<SurfaceRule>("surfaces", "bitmask", "when a fragment starts a new surface");
+pub const SURFACES: Typed<SurfaceRule> =
+    Typed::choice("surfaces", "bitmask", "when a fragment starts a new surface");
 /// As [`SORT`].
-pub const TRACK: Param =
-    Param::choice::<Tracked>("track", "survivors", "which samples the surface tracking sees");
+pub const TRACK: Typed<Tracked> =
+    Typed::choice("track", "survivors", "which samples the surface tracking sees");
 /// As [`SORT`].
-pub const PIXEL_ORDER: Param =
-    Param::choice::<PixelOrder>("pixel-order", "hilbert", "the curve that numbers the pixels");
+pub const PIXEL_ORDER: Typed<PixelOrder> =
+    Typed::choice("pixel-order", "hilbert", "the curve that numbers the pixels");
 /// As [`SORT`].
-pub const REFERENCE: Param =
-    Param::choice::<Reference>("reference", "lk2011", "how reference values are made");
+pub const REFERENCE: Typed<Reference> =
+    Typed::choice("reference", "lk2011", "how reference values are made");
 /// As [`SORT`].
-pub const PREHASH: Param =
-    Param::flag("prehash", false, "hash surface and seed before they scramble (sobol_burley)");
+pub const PREHASH: Typed<bool> =
+    Typed::flag("prehash", false, "hash surface and seed before they scramble (sobol_burley)");
 
 /// Whether chance decides which fragments form a surface, as figure 7 has it: biased.
 ///
@@ -104,9 +104,9 @@ pub const PREHASH: Param =
 /// come with others between them, which a trace may hold although no rasteriser makes
 /// it.)
 pub fn chance_decides_surfaces(values: &Values) -> bool {
-    values.choice::<SurfaceRule>(SURFACES.name) != SurfaceRule::EveryFragment
-        && values.choice::<Tracked>(TRACK.name) == Tracked::Survivors
-        && values.flag(COMPACT.name)
+    values.get(SURFACES) != SurfaceRule::EveryFragment
+        && values.get(TRACK) == Tracked::Survivors
+        && values.get(COMPACT)
 }
 
 /// Figure 7 with any reference values, for pixels of `N` samples.
@@ -125,17 +125,17 @@ pub struct TrackedSampler<R, const N: usize> {
 impl<R, const N: usize> TrackedSampler<R, N> {
     /// The sampler with its parameters in `values`.
     pub fn new(values: &Values, frame: &Frame, references: R) -> Self {
-        let compact = values.flag(COMPACT.name);
+        let compact = values.get(COMPACT);
         TrackedSampler {
             grid: frame.grid,
-            sort: values.flag(SORT.name),
+            sort: values.get(SORT),
             compact,
-            surfaces: values.choice(SURFACES.name),
+            surfaces: values.get(SURFACES),
             // Without compaction all covered samples are tracked and numbered either
             // way, so no counter is needed.
-            track: if compact { values.choice(TRACK.name) } else { Tracked::Survivors },
-            pixel_order: values.choice(PIXEL_ORDER.name),
-            prehash: values.flag(PREHASH.name),
+            track: if compact { values.get(TRACK) } else { Tracked::Survivors },
+            pixel_order: values.get(PIXEL_ORDER),
+            prehash: values.get(PREHASH),
             references,
         }
     }

@@ -16,15 +16,15 @@ use crate::tracked::{
 use crate::{colour, depth_bits};
 
 const PARAMS: &[Param] = &[
-    SORT,
-    COMPACT,
-    SURFACES,
-    TRACK,
-    PIXEL_ORDER,
-    REFERENCE,
-    PREHASH,
-    depth_bits::PARAM,
-    colour::PARAM,
+    SORT.param,
+    COMPACT.param,
+    SURFACES.param,
+    TRACK.param,
+    PIXEL_ORDER.param,
+    REFERENCE.param,
+    PREHASH.param,
+    depth_bits::PARAM.param,
+    colour::PARAM.param,
 ];
 
 const PIXELS: u16 = 4;
@@ -78,7 +78,7 @@ where
     // As `lk` has it.
     let values = Values::resolve("lk", PARAMS, &[]).unwrap();
     let plain = || {
-        let references = Hashed(values.choice(REFERENCE.name));
+        let references = Hashed(values.get(REFERENCE));
         single_pass(&values, &frame, TrackedSampler::new(&values, &frame, references))
     };
     let expected = held(&plain(), N as u32);

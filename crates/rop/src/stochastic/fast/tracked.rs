@@ -112,18 +112,18 @@ pub fn is_published(values: &Values) -> bool {
         && track == Tracked::Survivors
         && !prehash
         && depth_bits == 32
-        && values.choice::<Reference>(REFERENCE.name) == Reference::Lk2011
+        && values.get(REFERENCE) == Reference::Lk2011
 }
 
 impl Given {
     /// As `values` say.
     pub fn of(values: &Values) -> Self {
         Given(Switches {
-            sort: values.flag(SORT.name),
-            compact: values.flag(COMPACT.name),
-            surfaces: values.choice(SURFACES.name),
-            track: values.choice(TRACK.name),
-            prehash: values.flag(PREHASH.name),
+            sort: values.get(SORT),
+            compact: values.get(COMPACT),
+            surfaces: values.get(SURFACES),
+            track: values.get(TRACK),
+            prehash: values.get(PREHASH),
             depth_bits: depth_bits::of(values),
         })
     }
@@ -152,7 +152,7 @@ pub struct Track<K, M> {
 impl<R: Rules, F: FastReferences<N>, const N: usize> FastTracked<R, F, N> {
     /// The sampler of the rules and references, which must say what `values` do.
     pub fn new(values: &Values, rules: R, references: F) -> Self {
-        FastTracked { rules, references, pixel_order: values.choice(PIXEL_ORDER.name) }
+        FastTracked { rules, references, pixel_order: values.get(PIXEL_ORDER) }
     }
 }
 

@@ -6,13 +6,15 @@ use crate::scene::builtin::outlines::direction;
 use crate::scene::builtin::shapes::Solid;
 use crate::scene::builtin::{Builtin, SEED, seed};
 use crate::scene::{Material, Object, Scene, Shape, View};
-use screendoor_trace::param::{Param, Values};
+use screendoor_trace::param::{Typed, Values};
 use screendoor_trace::random::Stream;
+
+const PANES: Typed<i64> = Typed::integer("panes", "7", (1, 24), "how many panes");
 
 pub(super) const SCENE: Builtin = Builtin {
     name: "glass",
     summary: "large overlapping panes in saturated colours, alpha 0.5",
-    params: &[Param::integer("panes", "7", (1, 24), "how many panes"), SEED],
+    params: &[PANES.param, SEED.param],
     build,
 };
 
@@ -36,7 +38,7 @@ fn build(values: &Values) -> Scene {
         view: View { yaw: 18.0, pitch: 14.0, background: [0.82, 0.83, 0.84], ..View::default() },
         ..Scene::default()
     };
-    let count = values.integer("panes") as u32;
+    let count = values.get(PANES) as u32;
     for i in 0..count {
         let colour = COLOURS[i as usize % COLOURS.len()];
         let acrylic = Material::diffuse("acrylic", colour, 0.5);

@@ -5,29 +5,29 @@ use glam::Vec3;
 
 use crate::scene::builtin::{Builtin, SEED, seed};
 use crate::scene::{AlphaMode, Material, Mesh, Scene, Shape, View};
-use screendoor_trace::param::{Param, Values};
+use screendoor_trace::param::{Typed, Values};
 use screendoor_trace::random::Stream;
+
+const COUNT: Typed<i64> = Typed::integer("count", "8", (1, 100_000), "how many layers");
+const ALPHA: Typed<f64> = Typed::real("alpha", "0.1", (0.0, 1.0), "opacity of each");
+const COLOURED: Typed<bool> = Typed::flag("coloured", false, "random colours in place of white");
+const NEAR_FIRST: Typed<bool> =
+    Typed::flag("near-first", false, "drawn from the nearest on, not from the furthest");
 
 pub(super) const SCENE: Builtin = Builtin {
     name: "layers",
     summary: "parallel layers over the whole frame (LK figure 3 with count=8,alpha=0.1)",
-    params: &[
-        Param::integer("count", "8", (1, 100_000), "how many layers"),
-        Param::real("alpha", "0.1", (0.0, 1.0), "opacity of each"),
-        Param::flag("coloured", false, "random colours in place of white"),
-        Param::flag("near-first", false, "drawn from the nearest on, not from the furthest"),
-        SEED,
-    ],
+    params: &[COUNT.param, ALPHA.param, COLOURED.param, NEAR_FIRST.param, SEED.param],
     build,
 };
 
 fn build(values: &Values) -> Scene {
-    let count = values.integer("count");
+    let count = values.get(COUNT);
     let mut scene = Scene { view: View::FRONT, ..Scene::default() };
     for i in 0..count {
-        let place = if values.flag("near-first") { count - 1 - i } else { i };
+        let place = if values.get(NEAR_FIRST) { count - 1 - i } else { i };
         let mut random = Stream::new([0x1a7e5, seed(values), place as u32]);
-        let colour = if values.flag("coloured") {
+        let colour = if values.get(COLOURED) {
             [random.unit(), random.unit(), random.unit()]
         } else {
             [1.0; 3]
@@ -35,7 +35,7 @@ fn build(values: &Values) -> Scene {
         scene.materials.push(Material {
             alpha_mode: AlphaMode::Blend,
             unlit: true,
-            ..Material::diffuse("layer", colour, values.real("alpha") as f32)
+            ..Material::diffuse("layer", colour, values.get(ALPHA) as f32)
         });
         // One triangle that holds any frame: no edge is in sight.
         let z = place as f32 / count as f32;

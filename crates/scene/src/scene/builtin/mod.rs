@@ -14,7 +14,7 @@ mod smoke;
 
 use crate::scene::Scene;
 use screendoor_trace::error::{Error, Result};
-use screendoor_trace::param::{Param, Values, parse_spec};
+use screendoor_trace::param::{Param, Typed, Values, parse_spec};
 
 /// A built-in scene.
 #[derive(Clone, Copy, Debug)]
@@ -41,10 +41,10 @@ pub const BUILTINS: &[Builtin] = &[
 ];
 
 /// The seed that every random scene takes.
-const SEED: Param = Param::integer("seed", "1", (0, u32::MAX as i64), "which of its variants");
+const SEED: Typed<i64> = Typed::integer("seed", "1", (0, u32::MAX as i64), "which of its variants");
 
 fn seed(values: &Values) -> u32 {
-    values.integer("seed") as u32
+    values.get(SEED) as u32
 }
 
 /// The scene of `NAME` or `NAME:key=value,…` and the values of its parameters; nothing is
@@ -91,7 +91,9 @@ mod tests {
     /// the seed, and all flags set.
     fn smallest(builtin: &Builtin) -> Vec<String> {
         let setting = |p: &Param| match p.kind {
-            Kind::Integer { min, .. } if p.name != SEED.name => Some(format!("{}={min}", p.name)),
+            Kind::Integer { min, .. } if p.name != SEED.param.name => {
+                Some(format!("{}={min}", p.name))
+            }
             Kind::Flag => Some(format!("{}=true", p.name)),
             _ => None,
         };
@@ -116,7 +118,8 @@ mod tests {
                 };
                 for end in ends {
                     // A large scene would say nothing more about these.
-                    let small = param.name == SEED.name || matches!(param.kind, Kind::Real { .. });
+                    let small =
+                        param.name == SEED.param.name || matches!(param.kind, Kind::Real { .. });
                     let mut settings = if small { smallest(builtin) } else { Vec::new() };
                     settings.push(format!("{}={end}", param.name));
                     load(&spec(builtin, &settings)).unwrap();
@@ -131,7 +134,7 @@ mod tests {
             let mut settings = smallest(builtin);
             let first = text(&spec(builtin, &settings));
             assert_eq!(first, text(&spec(builtin, &settings)), "{}", builtin.name);
-            if builtin.params.iter().any(|p| p.name == SEED.name) {
+            if builtin.params.iter().any(|p| p.name == SEED.param.name) {
                 settings.push("seed=2".to_string());
                 assert_ne!(first, text(&spec(builtin, &settings)), "{}", builtin.name);
             }

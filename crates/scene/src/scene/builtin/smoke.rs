@@ -6,13 +6,15 @@ use glam::{Vec2, Vec3, Vec4};
 use crate::scene::builtin::noise::{curl, fractal, smooth};
 use crate::scene::builtin::{Builtin, SEED, seed};
 use crate::scene::{AlphaMode, Material, Particles, Scene, Shape, Texture, TextureUse, View, Wrap};
-use screendoor_trace::param::{Param, Values};
+use screendoor_trace::param::{Typed, Values};
 use screendoor_trace::random::{Stream, hash};
+
+const PUFFS: Typed<i64> = Typed::integer("puffs", "1500", (1, 4000), "how many puffs");
 
 pub(super) const SCENE: Builtin = Builtin {
     name: "smoke",
     summary: "a plume of soft puffs that face the camera, dozens of layers, alpha 0.05 at most",
-    params: &[Param::integer("puffs", "1500", (1, 4000), "how many puffs"), SEED],
+    params: &[PUFFS.param, SEED.param],
     build,
 };
 
@@ -30,8 +32,7 @@ fn build(values: &Values) -> Scene {
         view: View { yaw: 0.0, pitch: 8.0, background: [0.02, 0.035, 0.06], ..View::default() },
         ..Scene::default()
     };
-    let puffs: Vec<Puff> =
-        (0..values.integer("puffs") as u32).map(|i| puff(i, values, seed)).collect();
+    let puffs: Vec<Puff> = (0..values.get(PUFFS) as u32).map(|i| puff(i, values, seed)).collect();
     let colours = shade(&puffs);
     for variant in 0..VARIANTS {
         scene.textures.push(paint(hash([seed, variant])));
@@ -70,7 +71,7 @@ struct Puff {
 fn puff(i: u32, values: &Values, seed: u32) -> Puff {
     const STEPS: u32 = 40;
     let mut random = Stream::new([0x5a0e, seed, i]);
-    let age = (i as f32 + random.unit()) / values.integer("puffs") as f32;
+    let age = (i as f32 + random.unit()) / values.get(PUFFS) as f32;
     // More are old than young: they fill a wider plume.
     let age = libm::powf(age, 0.7);
     let mut centre = 0.10 * in_ball(&mut random);

@@ -1,6 +1,7 @@
 //! What study files may say, and what is said of those that do not.
 
 use super::*;
+use screendoor_rop::layers::LAYERS;
 
 const SMALL: &str = "name = 'a'\ndesigns = ['lk', 'kbuffer:layers={n}']\nsamples = [4, 8]\n\
     [[scene]]\nname = 'engine'\nsource = 'builtin:engine'\n";
@@ -15,7 +16,7 @@ fn message(from: &str, to: &str) -> String {
 fn what_is_left_out_has_its_default_and_is_written() {
     let study = Study::parse(SMALL, "a.toml").unwrap();
     assert_eq!((study.seeds, study.baseline.as_str()), (8, "lk"));
-    assert_eq!(study.design("kbuffer:layers={n}", 8).unwrap().values().integer("layers"), 8);
+    assert_eq!(study.design("kbuffer:layers={n}", 8).unwrap().values().get(LAYERS), 8);
     let text = study.to_toml();
     assert!(text.contains("seeds = 8"), "{text}");
     assert_eq!(Study::parse(&text, "b.toml").unwrap(), study);

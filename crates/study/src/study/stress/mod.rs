@@ -258,9 +258,9 @@ fn findings(
 
 fn designs() -> Result<Vec<Configured>> {
     let defaults = DESIGNS.iter().map(|entry| entry.configure(&[]));
-    let methods = Method::CHOICES.iter().filter(|m| m.name != METHOD.default);
+    let methods = Method::CHOICES.iter().filter(|m| m.name != METHOD.param.default);
     let of_several_passes = SAMPLERS.iter().flat_map(|sampler| {
-        methods.clone().map(move |m| format!("{sampler}:{}={}", METHOD.name, m.name))
+        methods.clone().map(move |m| format!("{sampler}:{}={}", METHOD.param.name, m.name))
     });
     let beside = EXTREMES.iter().map(|spec| spec.to_string()).chain(of_several_passes);
     defaults.chain(beside.map(|spec| configure(&spec, &[]))).collect()
@@ -347,7 +347,7 @@ impl Trial<'_> {
     /// single precision, of which alone it promises anything: sums in half floats lose what
     /// is less than 3e-8. None where colours are that wide anyway, or the design stores none.
     fn outcome_of_single_precision(&self, design: &Configured) -> Option<Outcome> {
-        let single = (colour::PARAM.name.to_string(), "32".to_string());
+        let single = (colour::PARAM.param.name.to_string(), "32".to_string());
         let wide = configure(&design.label(), &[single]).ok()?;
         let narrow = self.case.colour == ColourFormat::F16;
         narrow.then(|| self.outcome(&wide, &self.picture(&wide, Which::Reference, 0)))

@@ -8,16 +8,15 @@ use rayon::prelude::*;
 
 use crate::scene::builtin::{Builtin, SEED, seed};
 use crate::scene::{Material, Mesh, Scene, Shape, TextureUse, View};
-use screendoor_trace::param::{Param, Values};
+use screendoor_trace::param::{Typed, Values};
+
+const SHEETS: Typed<i64> = Typed::integer("sheets", "5", (1, 8), "how many sheets");
+const CELLS: Typed<i64> = Typed::integer("cells", "72", (8, 96), "cells along a sheet's side");
 
 pub(super) const SCENE: Builtin = Builtin {
     name: "cloth",
     summary: "draped sheets with printed and woven patterns, alpha 0.4",
-    params: &[
-        Param::integer("sheets", "5", (1, 8), "how many sheets"),
-        Param::integer("cells", "72", (8, 96), "cells along a sheet's side"),
-        SEED,
-    ],
+    params: &[SHEETS.param, CELLS.param, SEED.param],
     build,
 };
 
@@ -26,8 +25,8 @@ fn build(values: &Values) -> Scene {
         view: View { yaw: 30.0, pitch: 24.0, background: [0.06, 0.065, 0.075], ..View::default() },
         ..Scene::default()
     };
-    let cells = values.integer("cells") as usize / 2 * 2;
-    let sheets = values.integer("sheets") as u32;
+    let cells = values.get(CELLS) as usize / 2 * 2;
+    let sheets = values.get(SHEETS) as u32;
     let draped: Vec<drape::Sheet> =
         (0..sheets).into_par_iter().map(|i| drape::drape(i, sheets, cells, seed(values))).collect();
     for (i, sheet) in draped.iter().enumerate() {

@@ -16,24 +16,26 @@ use crate::scene::builtin::Builtin;
 use crate::scene::builtin::outlines::{cut, direction};
 use crate::scene::builtin::shapes::Solid;
 use crate::scene::{Material, Object, Scene, Shape, View};
-use screendoor_trace::param::{Param, Values};
+use screendoor_trace::param::{Typed, Values};
+
+const ROWS: Typed<i64> = Typed::integer("rows", "4", (1, 6), "cylinders in each of the two banks");
+const CRANK: Typed<f64> =
+    Typed::real("crank", "50", (0.0, 720.0), "degrees that the crankshaft has turned");
+const DETAIL: Typed<i64> =
+    Typed::integer("detail", "3", (2, 5), "how finely round parts are cut into triangles");
 
 pub(super) const SCENE: Builtin = Builtin {
     name: "engine",
     summary: "a V engine of over 100 thousand triangles, white, alpha 0.3",
-    params: &[
-        Param::integer("rows", "4", (1, 6), "cylinders in each of the two banks"),
-        Param::real("crank", "50", (0.0, 720.0), "degrees that the crankshaft has turned"),
-        Param::integer("detail", "3", (2, 5), "how finely round parts are cut into triangles"),
-    ],
+    params: &[ROWS.param, CRANK.param, DETAIL.param],
     build,
 };
 
 fn build(values: &Values) -> Scene {
     let mut engine = Engine {
-        rows: values.integer("rows") as usize,
-        crank: values.real("crank"),
-        detail: values.integer("detail") as usize,
+        rows: values.get(ROWS) as usize,
+        crank: values.get(CRANK),
+        detail: values.get(DETAIL) as usize,
         scene: Scene {
             materials: vec![Material::diffuse("white", [1.0; 3], 0.3)],
             view: View {

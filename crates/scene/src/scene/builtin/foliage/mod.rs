@@ -7,19 +7,21 @@ use glam::Vec3;
 
 use crate::scene::builtin::{Builtin, SEED, seed};
 use crate::scene::{AlphaMode, Material, Scene, Shape, TextureUse, View};
-use screendoor_trace::param::{Param, Values};
+use screendoor_trace::param::{Typed, Values};
+
+const CARDS: Typed<i64> = Typed::integer("cards", "9000", (1, 20_000), "how many cards of leaves");
 
 pub(super) const SCENE: Builtin = Builtin {
     name: "foliage",
     summary: "a tree of alpha-mapped leaf cards on opaque branches",
-    params: &[Param::integer("cards", "9000", (1, 20_000), "how many cards of leaves"), SEED],
+    params: &[CARDS.param, SEED.param],
     build,
 };
 
 fn build(values: &Values) -> Scene {
     let seed = seed(values);
     let tree = wood::grow(seed);
-    let cards = leaves::cards(&tree.twigs, values.integer("cards") as u32, seed, 1);
+    let cards = leaves::cards(&tree.twigs, values.get(CARDS) as u32, seed, 1);
     let mut scene = Scene {
         materials: vec![
             Material::diffuse("bark", [0.17, 0.115, 0.075], 1.0),
