@@ -1,16 +1,14 @@
 //! Multi-layer alpha blending (Salvi, Vaidyanathan, I3D 2014): layers in the order
 //! of their depths; where there is one too many, the last two are merged.
 
-use screendoor_rop::layers::{COVERAGE, LAYERS, Layer, Layering, contents};
+use screendoor_rop::layers::{COVERAGE, LAYERS, Layer, Layering};
 use screendoor_rop::shader;
 use screendoor_rop::{
-    Blueprint, Contents, Declaration, Family, Frame, Info, Layout, OnDevice, OpaquePromise,
-    OrderPromise, OverOpaque, PixelWords, Port, Probe, Promises, Site, Transparent, colour,
-    over_opaque,
+    Blueprint, Bounded, Eviction, Family, Frame, Info, OpaquePromise, OrderPromise, OverOpaque,
+    Port, Probe, Promises, colour, over_opaque,
 };
 use screendoor_trace::error::Result;
 use screendoor_trace::param::Values;
-use screendoor_trace::trace::Fragment;
 
 /// The design's entry in the registry.
 pub struct Mlab;
@@ -25,11 +23,10 @@ impl Blueprint for Mlab {
         combinations: &[],
     };
 
-    type At<const N: usize> = OverOpaque<MlabAt<N>, N>;
+    type At<const N: usize> = OverOpaque<Bounded<Merged, N>, N>;
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
-        let inner = MlabAt(Layering::of(values, frame));
-        Ok(OverOpaque::new(values, frame, over_opaque::of(values), inner))
+        Ok(Bounded::over_opaque(values, frame))
     }
 
     const PORTED: bool = true;
@@ -50,59 +47,26 @@ impl Blueprint for Mlab {
     }
 }
 
-/// The design for pixels of `N` samples.
-#[derive(Clone, Debug)]
-pub struct MlabAt<const N: usize>(Layering<N>);
+/// The last two of one layer too many become one.
+#[derive(Clone, Copy, Debug)]
+pub struct Merged;
 
-impl<const N: usize> Transparent<N> for MlabAt<N> {
-    /// The layers from near to far.
-    type Pixel = Vec<Layer>;
-
-    fn layout(&self) -> Layout {
-        self.0.layout()
-    }
-
-    fn clear(&self, _site: Site) -> Vec<Layer> {
-        Vec::new()
-    }
-
-    fn draw<P: Probe>(
-        &self,
-        _pass: u32,
-        _site: Site,
-        layers: &mut Vec<Layer>,
-        fragment: &Fragment,
+impl Eviction for Merged {
+    fn evict<P: Probe, const N: usize>(
+        layering: &Layering<N>,
+        layers: &mut [Layer],
+        new: &Layer,
+        evicted: Layer,
         probe: &mut P,
-    ) {
-        let layer = self.0.columns.layer(fragment);
-        if let Some(furthest) = self.0.insert(layers, layer, probe)
-            && let Some(last) = layers.last_mut()
-        {
-            *last = self.0.columns.stored(last.merged(&furthest));
+    ) -> bool {
+        if let Some(last) = layers.last_mut() {
+            *last = layering.columns.stored(last.merged(&evicted));
             // Where all moved, the last was read and is written anyway.
-            if furthest == layer {
-                probe.state(self.0.bits - 32, self.0.bits);
+            if evicted == *new {
+                probe.state(layering.bits - 32, layering.bits);
             }
         }
-        probe.written(fragment.coverage);
-    }
-
-    fn resolve(&self, _site: Site, layers: &Vec<Layer>, behind: &[[f32; 3]; N]) -> [f64; 3] {
-        self.0.resolve(layers, behind)
-    }
-
-    fn contents(&self, layers: &Vec<Layer>) -> Contents {
-        contents(layers)
-    }
-}
-
-impl<const N: usize> OnDevice<Vec<Layer>> for MlabAt<N> {
-    fn declare(&self, to: &mut Declaration) {
-        self.0.declare(to);
-    }
-
-    fn read(&self, site: Site, from: &PixelWords<'_>) -> Vec<Layer> {
-        self.0.read(site, from)
+        true
     }
 }
 
@@ -110,9 +74,9 @@ impl<const N: usize> OnDevice<Vec<Layer>> for MlabAt<N> {
 mod tests {
     use super::*;
     use crate::configure;
-    use screendoor_rop::{Frame, draw_pixel};
+    use screendoor_rop::{Frame, Site, draw_pixel};
     use screendoor_trace::tile::TileGrid;
-    use screendoor_trace::trace::{DepthPlane, SampleMask, Unorm32};
+    use screendoor_trace::trace::{DepthPlane, Fragment, SampleMask, Unorm32};
 
     #[test]
     fn a_merge_by_hand() {

@@ -43,6 +43,7 @@ pub use contract::shader::Shader;
 pub use contract::words::{
     Constant, Declaration, Field, OnDevice, PixelWords, Ranks, TILE, TileWords,
 };
+pub use layered::bounded::{Bounded, Eviction};
 pub use layered::normalise::{Normalise, Sums};
 pub use replay::{
     ExplainLimits, Explanation, ReplayOptions, Replayed, Step, Which, draw_pixel, explain, replay,

@@ -1,0 +1,93 @@
+//! A bounded list of layers, from near to far: the design of all who differ in what becomes
+//! of the layer that does not fit.
+
+use std::fmt::Debug;
+use std::marker::PhantomData;
+
+use screendoor_trace::param::Values;
+use screendoor_trace::trace::Fragment;
+
+use crate::contract::contents::Contents;
+use crate::contract::event::Probe;
+use crate::contract::frame::{Frame, Site};
+use crate::contract::layout::Layout;
+use crate::contract::over_opaque::{self, OverOpaque, Transparent};
+use crate::contract::words::{Declaration, OnDevice, PixelWords};
+use crate::layered::layers::{Layer, Layering, contents};
+
+/// What becomes of the furthest of one layer too many.
+pub trait Eviction: Clone + Copy + Debug + Send + Sync + 'static {
+    /// `evicted` was taken from behind `layers` when `new` came, which it may be itself.
+    /// Tells whether the fragment of `new` left anything.
+    fn evict<P: Probe, const N: usize>(
+        layering: &Layering<N>,
+        layers: &mut [Layer],
+        new: &Layer,
+        evicted: Layer,
+        probe: &mut P,
+    ) -> bool;
+}
+
+/// The design for pixels of `N` samples.
+#[derive(Clone, Debug)]
+pub struct Bounded<E, const N: usize> {
+    layering: Layering<N>,
+    eviction: PhantomData<E>,
+}
+
+impl<E: Eviction, const N: usize> Bounded<E, N> {
+    /// As the parameters of [`Layering::of`] and [`over_opaque::PARAM`] say.
+    pub fn over_opaque(values: &Values, frame: &Frame) -> OverOpaque<Self, N> {
+        let inner = Bounded { layering: Layering::of(values, frame), eviction: PhantomData };
+        OverOpaque::new(values, frame, over_opaque::of(values), inner)
+    }
+}
+
+impl<E: Eviction, const N: usize> Transparent<N> for Bounded<E, N> {
+    /// The layers from near to far.
+    type Pixel = Vec<Layer>;
+
+    fn layout(&self) -> Layout {
+        self.layering.layout()
+    }
+
+    fn clear(&self, _site: Site) -> Vec<Layer> {
+        Vec::new()
+    }
+
+    fn draw<P: Probe>(
+        &self,
+        _pass: u32,
+        _site: Site,
+        layers: &mut Vec<Layer>,
+        fragment: &Fragment,
+        probe: &mut P,
+    ) {
+        let layer = self.layering.columns.layer(fragment);
+        let written = match self.layering.insert(layers, layer, probe) {
+            Some(evicted) => E::evict(&self.layering, layers, &layer, evicted, probe),
+            None => true,
+        };
+        if written {
+            probe.written(fragment.coverage);
+        }
+    }
+
+    fn resolve(&self, _site: Site, layers: &Vec<Layer>, behind: &[[f32; 3]; N]) -> [f64; 3] {
+        self.layering.resolve(layers, behind)
+    }
+
+    fn contents(&self, layers: &Vec<Layer>) -> Contents {
+        contents(layers)
+    }
+}
+
+impl<E: Eviction, const N: usize> OnDevice<Vec<Layer>> for Bounded<E, N> {
+    fn declare(&self, to: &mut Declaration) {
+        self.layering.declare(to);
+    }
+
+    fn read(&self, site: Site, from: &PixelWords<'_>) -> Vec<Layer> {
+        self.layering.read(site, from)
+    }
+}
