@@ -169,14 +169,17 @@ impl<'a> Fragments<'a> {
                 needed.div_ceil(1 << 20),
                 limits.memory >> 20
             );
-            return refuse(why, left, if left == 0 { "raise --memory" } else { ", or raise --memory" });
+            return refuse(
+                why,
+                left,
+                if left == 0 { "raise --memory" } else { ", or raise --memory" },
+            );
         }
         let composited = steps * fragments;
         if design.bytes_per_fragment().is_some() && composited > MOST_COMPOSITED && steps > 1 {
             let left = (MOST_COMPOSITED / fragments).max(1);
-            let why = format!(
-                "all of which the design composites anew for each of up to {steps} steps"
-            );
+            let why =
+                format!("all of which the design composites anew for each of up to {steps} steps");
             return refuse(why, left, "");
         }
         Ok(())
@@ -242,11 +245,9 @@ pub fn explain(
     let mut steps_in_all = fragments.count * u64::from(passes);
     if is_counted {
         steps_in_all = 0;
-        fragments.draw(
-            design,
-            &|done| progress(before + done, total),
-            |_, _, _, record, _| steps_in_all += u64::from(is_told(&record)),
-        )?;
+        fragments.draw(design, &|done| progress(before + done, total), |_, _, _, record, _| {
+            steps_in_all += u64::from(is_told(&record))
+        })?;
         before += drawn;
     }
     let (tile, within) = (frame.grid.tile(site.x, site.y), TileGrid::within(site.x, site.y));
@@ -255,17 +256,16 @@ pub fn explain(
     let skipped = steps_in_all.saturating_sub(limits.last.saturating_add(1) as u64);
     let (mut steps, mut seen) = (Vec::new(), 0);
     let watch = |done| progress(before + done, total);
-    let (state, ended) =
-        fragments.draw(design, &watch, |pass, row, fragment, record, state| {
-            if !is_told(&record) {
-                return;
-            }
-            seen += 1;
-            if seen > skipped {
-                let contents = design.contents(state, within);
-                steps.push(Step { pass, row, fragment, record, contents });
-            }
-        })?;
+    let (state, ended) = fragments.draw(design, &watch, |pass, row, fragment, record, state| {
+        if !is_told(&record) {
+            return;
+        }
+        seen += 1;
+        if seen > skipped {
+            let contents = design.contents(state, within);
+            steps.push(Step { pass, row, fragment, record, contents });
+        }
+    })?;
     let mut left_out = skipped;
     let before = (steps.len() > limits.last).then(|| {
         left_out += 1;

@@ -43,6 +43,15 @@ const BYTES_PER_FRAGMENT: u64 = (size_of::<Row>() + size_of::<(u32, u32)>() + 1)
 /// As [`Trace::batch`] and [`crate::trace::SamplePattern::prefix`];
 /// [`crate::error::Error::Config`] for a pixel of more than two billion fragments.
 pub fn tied_fragments(trace: &Trace, samples: u32) -> Result<u64> {
+    tied_fragments_within(trace, samples, MEMORY)
+}
+
+/// As [`tied_fragments`] in at most `memory` bytes.
+///
+/// # Errors
+/// As [`tied_fragments`]; [`crate::error::Error::Config`] where a pixel needs more memory: a
+/// quarter of a byte for each of its fragments.
+pub fn tied_fragments_within(trace: &Trace, samples: u32, memory: u64) -> Result<u64> {
     let header = trace.header();
     let grid = TileGrid::new(header.width, header.height);
     let mut counts: Counts = TileMap::new(grid);
@@ -55,10 +64,10 @@ pub fn tied_fragments(trace: &Trace, samples: u32) -> Result<u64> {
             *count = count.saturating_add(1);
         }
     }
-    tied(trace, samples, &counts, MEMORY, &mut |_, _| ())
+    tied(trace, samples, &counts, memory, &mut |_, _| ())
 }
 
-/// As [`tied_fragments`] in at most `memory` bytes, where `counts` are known. Tells `progress`
+/// As [`tied_fragments_within`] where `counts` are known. Tells `progress`
 /// how many fragments were read, of how many.
 ///
 /// # Errors
@@ -152,8 +161,7 @@ fn tied_in_group(
     // Which of a tile's pixels are wanted, and their rows.
     let mut rows: TileMap<([bool; TILE_PIXELS], Vec<Row>)> = TileMap::new(grid);
     for (tile, within) in group {
-        let (wanted, _) =
-            rows.get_or_insert_with(*tile, || ([false; TILE_PIXELS], Vec::new()));
+        let (wanted, _) = rows.get_or_insert_with(*tile, || ([false; TILE_PIXELS], Vec::new()));
         wanted[within.clone()].fill(true);
     }
     for (tile, (wanted, rows)) in rows.touched_mut() {
