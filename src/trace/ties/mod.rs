@@ -325,7 +325,7 @@ mod tests {
                     2 => 10_000_000 + i * 64,
                     _ => 2_000_000_000 + (i.wrapping_mul(0x9e37_79b9) >> 16),
                 };
-                let x = if i % 100 == 0 { 3 } else { 2 };
+                let x = if i.is_multiple_of(100) { 3 } else { 2 };
                 (x, u64::from(1 + i % 3), z, (i % 5) as i32 * 32)
             })
             .collect();
