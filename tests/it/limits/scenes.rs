@@ -70,7 +70,8 @@ fn many_triangles(count: usize) -> String {
 pub(super) fn triangles_cost_little_and_too_many_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("t.obj"), many_triangles(300_000)).unwrap();
-    let run = capture(folder.path(), "t.obj", "4x4");
+    let run = capture(folder.path(), "t.obj", "200x200");
+    assert!(!run.error.contains("no fragment"), "{}", run.error);
     // A file of 4 MB; three indices and what they stand for.
     run.is_good(BESIDE_SCENE, "many triangles");
 
