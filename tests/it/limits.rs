@@ -88,6 +88,7 @@ fn write(path: &Path, header: &Header, count: u32, pixel: impl Fn(u32) -> (u16, 
             alpha: 0.01,
             primitive: i,
             object: 0,
+            ..Fragment::default()
         };
         writer.push(&fragment).unwrap();
     }

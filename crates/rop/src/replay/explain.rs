@@ -83,7 +83,8 @@ fn bytes_per_step(samples: u32) -> u64 {
 }
 
 /// Tells `each` the row and the fragment of all that cover a sample of pixel `site`, their
-/// coverage cut to the frame's samples.
+/// coverage cut to the frame's samples, without optional columns that the design does not
+/// read.
 fn for_each_fragment(
     frame: &Frame,
     trace: &Trace,
@@ -98,6 +99,7 @@ fn for_each_fragment(
         for i in (0..batch.len()).filter(|i| batch.pixel(*i) == (site.x, site.y)) {
             let mut fragment = batch.fragment(i);
             fragment.coverage = fragment.coverage & mask;
+            fragment.optional = fragment.optional.only(frame.columns);
             if !fragment.coverage.is_empty() {
                 each(row + i as u64, fragment);
             }

@@ -123,7 +123,7 @@ mod tests {
             colour: ColourFormat::F16,
             source: "test".into(),
             camera: "none".into(),
-            constants: Default::default(),
+            ..Header::default()
         };
         let options = WriteOptions { batch_rows: 3, ..WriteOptions::default() };
         let mut writer = TraceWriter::new(Vec::new(), "test", header, options).unwrap();
@@ -132,7 +132,17 @@ mod tests {
             let coverage = SampleMask(*coverage);
             let (primitive, object) = (i as u32, 0);
             let (colour, alpha) = ([1.0; 3], 0.5);
-            let f = Fragment { x: *x, y: 1, coverage, depth, colour, alpha, primitive, object };
+            let f = Fragment {
+                x: *x,
+                y: 1,
+                coverage,
+                depth,
+                colour,
+                alpha,
+                primitive,
+                object,
+                ..Fragment::default()
+            };
             writer.push(&f).unwrap();
         }
         let trace = Trace::from_bytes(writer.finish().unwrap().0, "test").unwrap();
