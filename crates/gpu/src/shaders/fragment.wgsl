@@ -1,4 +1,4 @@
-// Twin of crates/trace/src/trace/fragment.rs and of what crates/trace/src/trace/batch.rs makes of columns.
+// Twin of crates/trace/src/trace/fragment.rs.
 // uses: bindings loaders mask
 
 struct Fragment {

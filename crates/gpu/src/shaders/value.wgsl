@@ -1,4 +1,5 @@
-// Values of columns, as the loaders of each column ask for them.
+// Values of columns, as the loaders of each column ask for them: twin of
+// crates/trace/src/trace/cells.rs.
 // uses: bindings
 
 // A value of up to four bytes, or the lower word of eight. Where a column has no bytes its
