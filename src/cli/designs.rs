@@ -60,6 +60,7 @@ impl Needs {
             colour_bits: 48,
             opaque,
             primitive_depths: Some(Arc::default()),
+            columns: Default::default(),
         };
         let engine = design.build(&frame, Which::Reference)?;
         let (state_bits, layout) = (engine.state_bits(), engine.layout());

@@ -178,6 +178,7 @@ fn stacked(fragments: &[(f32, f32)]) -> Trace {
         alpha: *alpha,
         primitive: i as u32,
         object: 0,
+        ..Fragment::default()
     };
     trace(&header, &fragments.iter().enumerate().map(fragment).collect::<Vec<_>>())
 }

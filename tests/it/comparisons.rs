@@ -22,6 +22,7 @@ fn fragment(depth: u32, coverage: u64, alpha: f32) -> Fragment {
         alpha,
         primitive: depth,
         object: 0,
+        ..Fragment::default()
     }
 }
 

@@ -16,6 +16,7 @@ fn three_fragments() -> Trace {
         alpha: 1.0,
         primitive: i,
         object: 0,
+        ..Fragment::default()
     };
     let fragments = [
         // Two samples of a cleared pixel.

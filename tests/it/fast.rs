@@ -61,6 +61,7 @@ pub fn crowd(header: &Header, count: usize, seed: u32) -> Vec<Fragment> {
             alpha,
             primitive: random.below(5),
             object: random.below(2),
+            ..Fragment::default()
         }
     };
     (0..count).map(fragment).collect()

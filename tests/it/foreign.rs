@@ -108,6 +108,7 @@ fn numbers_of_other_types_are_read_where_they_fit() {
         alpha: [0.0, 0.5, 1.0][i % 3],
         primitive: i as u32,
         object: 99 - i as u32,
+        ..Fragment::default()
     };
     let expected: Vec<Fragment> = (0..ROWS).map(fragment).collect();
     let whole = |name: &str, f: &Fragment| match name {

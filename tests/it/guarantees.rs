@@ -98,6 +98,7 @@ fn in_pieces(header: &Header, alpha: f32, pieces: u32) -> Vec<Fragment> {
                     alpha,
                     primitive: i as u32,
                     object: 0,
+                    ..Fragment::default()
                 });
             }
         }

@@ -145,6 +145,7 @@ fn interleaved_pieces(header: &Header) -> Vec<Fragment> {
                         alpha: 0.4,
                         primitive: surface * 3 + i as u32,
                         object: surface / 2,
+                        ..Fragment::default()
                     });
                 }
             }

@@ -38,7 +38,7 @@ pub fn header(width: u32, height: u32, samples: u32) -> Header {
         colour: ColourFormat::F32,
         source: "test".into(),
         camera: "none".into(),
-        constants: Default::default(),
+        ..Header::default()
     }
 }
 
@@ -67,6 +67,7 @@ pub fn random_fragments(header: &Header, count: usize, seed: u32) -> Vec<Fragmen
             alpha: random.unit(),
             primitive: i as u32,
             object: i as u32 / 100,
+            ..Fragment::default()
         }
     };
     (0..count).map(&mut fragment).collect()
@@ -145,6 +146,7 @@ pub fn layered(
                     alpha,
                     primitive: i,
                     object: i,
+                    ..Fragment::default()
                 });
             }
         }
@@ -169,6 +171,7 @@ pub fn nearly_bare(samples: u32, background: [f32; 3]) -> Trace {
         alpha,
         primitive: u32::from(x),
         object: 0,
+        ..Fragment::default()
     };
     trace(&header, &[fragment(3, 0.5), fragment(5, 1.0)])
 }

@@ -199,6 +199,7 @@ mod tests {
             colour_bits: 96,
             opaque: true,
             primitive_depths: None,
+            columns: Default::default(),
         };
         let design = AdaptiveAt::<1> { columns: Columns::of(design.values(), &frame), nodes: 3 };
         let node = |depth, transmittance| Layer {

@@ -12,7 +12,7 @@ use screendoor_rop::{
 };
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::param::Values;
-use screendoor_trace::trace::Trace;
+use screendoor_trace::trace::{ColumnSet, Trace};
 
 /// A design in the registry. The types behind it are known here and nowhere
 /// else: one dynamic call a replay, none a fragment.
@@ -26,6 +26,8 @@ pub struct Entry {
     ported: bool,
     /// Whether the frame must hold the primitives' mean depths.
     primitive_depths: bool,
+    /// The optional columns that are read.
+    columns: ColumnSet,
 }
 
 /// Calls a function with the frame's sample count as a constant.
@@ -82,6 +84,7 @@ impl Entry {
             port: |values, frame| for_samples!(frame.samples(), port_at::<B>(values, frame)),
             ported: B::PORTED,
             primitive_depths: B::PRIMITIVE_DEPTHS,
+            columns: B::COLUMNS,
         }
     }
 
@@ -259,6 +262,7 @@ impl Configured {
         if self.entry.primitive_depths {
             frame.primitive_depths = Some(Arc::new(PrimitiveDepths::of(trace, memory)?));
         }
+        frame.columns = self.entry.columns;
         Ok(frame)
     }
 

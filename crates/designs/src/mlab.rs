@@ -88,6 +88,7 @@ mod tests {
             colour_bits: 48,
             opaque: true,
             primitive_depths: None,
+            columns: Default::default(),
         };
         let fragment = |z: u32, colour: f32, alpha: f32| Fragment {
             x: 0,
@@ -98,6 +99,7 @@ mod tests {
             alpha,
             primitive: z,
             object: 0,
+            ..Fragment::default()
         };
         let design = configure("mlab:layers=2", &[]).unwrap();
         let design = Mlab::at::<1>(design.values(), &frame).unwrap();

@@ -257,6 +257,7 @@ mod tests {
                 alpha,
                 primitive: 0,
                 object: 0,
+                ..Fragment::default()
             };
             design.draw(0, site, &mut pixel, &fragment, &mut screendoor_rop::NoProbe);
         }

@@ -4,10 +4,11 @@
 use std::ops::Range;
 
 use crate::device::Gpu;
+use crate::loaders;
 use crate::params::{Column, Params, words};
 use screendoor_rop::Constant;
 use screendoor_trace::error::Result;
-use screendoor_trace::trace::{ColumnId, Scalar, Trace, ValueType};
+use screendoor_trace::trace::{ColumnId, ColumnSet, Scalar, Trace, ValueType};
 
 /// Rows of a batch.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,11 +36,19 @@ pub(super) struct Uploaded {
 
 impl Chunks {
     /// Cuts `trace` so that neither a chunk's columns nor a word for each of its rows take
-    /// more than `bytes`, nor more than `rows` rows.
-    pub fn of(trace: &Trace, bytes: u64, rows: u64) -> Self {
+    /// more than `bytes`, nor more than `rows` rows; of optional columns there are `read`.
+    pub fn of(trace: &Trace, bytes: u64, rows: u64, read: ColumnSet) -> Self {
         let header = trace.header();
-        let stored = trace.columns().to_vec();
-        let constants = header.constants.iter().map(|(id, value)| (*id, *value)).collect();
+        let wanted = |id: ColumnId| !id.is_optional() || read.contains(id);
+        let stored: Vec<_> =
+            trace.columns().iter().copied().filter(|(id, _)| wanted(*id)).collect();
+        let constant = |id: ColumnId| {
+            let given = header.constants.get(&id).copied().filter(|_| wanted(id));
+            Some((id, given.or(id.default_value())?))
+        };
+        let is_stored = |id: &ColumnId| stored.iter().any(|(stored, _)| stored == id);
+        let others = ColumnId::ALL.into_iter().filter(|id| !is_stored(id));
+        let constants = others.filter_map(constant).collect();
         let row: usize = stored.iter().map(|(_, value_type)| value_type.bytes()).sum();
         // A column begins with a whole word.
         let room = bytes.saturating_sub(4 * ColumnId::ALL.len() as u64);
@@ -67,8 +76,7 @@ impl Chunks {
     pub fn types(&self) -> impl Iterator<Item = (String, Constant)> {
         ColumnId::ALL.into_iter().map(|id| {
             let bytes = self.stored.iter().find(|(s, _)| *s == id).map_or(0, |(_, t)| t.bytes());
-            let name = format!("{}_BYTES", id.name().to_uppercase());
-            (name, Constant::Whole(bytes as u32))
+            (loaders::bytes_constant(id), Constant::Whole(bytes as u32))
         })
     }
 
@@ -98,11 +106,11 @@ impl Chunks {
                 Scalar::Signed(v) => [*v as u32, 0],
                 Scalar::Real(v) => [v.to_bits(), 0],
             };
-            *column(&mut params, *id) = Column { low, high, ..Column::default() };
+            params.columns[*id as usize] = Column { low, high, ..Column::default() };
         }
         for ((id, _), place) in self.stored.iter().zip(&places) {
             let at = (place / 4) as u32;
-            *column(&mut params, *id) = Column { at, ..Column::default() };
+            params.columns[*id as usize] = Column { at, ..Column::default() };
         }
         let usage = wgpu::BufferUsages::STORAGE;
         let buffer = gpu.mapped("a chunk's columns", bytes, usage, |mut to| {
@@ -112,7 +120,7 @@ impl Chunks {
                 for (id, buffer) in batch.buffers() {
                     let Some((value_type, values)) = buffer else { continue };
                     let column = self.stored.iter().position(|(stored, _)| *stored == id);
-                    let column = column.expect("all batches have the trace's columns");
+                    let Some(column) = column else { continue };
                     let size = value_type.bytes();
                     let values = &values[part.rows.start * size..part.rows.end * size];
                     let start = places[column] as usize + row * size;
@@ -144,23 +152,6 @@ fn cut(batches: impl Iterator<Item = usize>, most: usize) -> Vec<Vec<Part>> {
         }
     }
     list
-}
-
-fn column(params: &mut Params, id: ColumnId) -> &mut Column {
-    match id {
-        ColumnId::X => &mut params.x,
-        ColumnId::Y => &mut params.y,
-        ColumnId::Coverage => &mut params.coverage,
-        ColumnId::Z => &mut params.z,
-        ColumnId::Dzdx => &mut params.dzdx,
-        ColumnId::Dzdy => &mut params.dzdy,
-        ColumnId::R => &mut params.r,
-        ColumnId::G => &mut params.g,
-        ColumnId::B => &mut params.b,
-        ColumnId::Alpha => &mut params.alpha,
-        ColumnId::Primitive => &mut params.primitive,
-        ColumnId::Object => &mut params.object,
-    }
 }
 
 #[cfg(test)]

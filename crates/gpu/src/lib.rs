@@ -18,6 +18,8 @@ mod chunk;
 #[cfg(feature = "wgpu")]
 mod device;
 mod differences;
+#[cfg(feature = "wgpu")]
+mod loaders;
 mod options;
 #[cfg(feature = "wgpu")]
 mod params;

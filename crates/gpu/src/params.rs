@@ -4,6 +4,7 @@ use bytemuck::{Pod, Zeroable};
 
 use screendoor_rop::Frame;
 use screendoor_trace::tile::{TILE_SIDE, TileGrid};
+use screendoor_trace::trace::ColumnId;
 
 /// Declares a structure that a shader declares too, and a list of its members, by which a
 /// test holds the one against the other.
@@ -50,18 +51,7 @@ mirrored! {
         fragments: u32,
         digit_at: u32,
         blocks: u32,
-        x: Column,
-        y: Column,
-        coverage: Column,
-        z: Column,
-        dzdx: Column,
-        dzdy: Column,
-        r: Column,
-        g: Column,
-        b: Column,
-        alpha: Column,
-        primitive: Column,
-        object: Column,
+        columns: [Column; ColumnId::COUNT],
     }
 }
 

@@ -202,7 +202,8 @@ impl<'a> GpuRun<'a> {
         let start = Instant::now();
         let bytes = most_bytes(&gpu.device);
         // Behind the keys stands their number.
-        let chunks = Chunks::of(trace, bytes, options.rows.min(bytes / 4 - 1).min(MAX_ROWS));
+        let rows = options.rows.min(bytes / 4 - 1).min(MAX_ROWS);
+        let chunks = Chunks::of(trace, bytes, rows, frame.columns);
         let mut run = GpuRun {
             gpu,
             port,

@@ -3,6 +3,7 @@
 
 use std::fmt::Write;
 
+use crate::loaders;
 use screendoor_rop::shader;
 use screendoor_rop::{Constant, SHADERS, Shader};
 
@@ -13,6 +14,7 @@ pub(super) const OWN: &[Shader] = &[
     shader!("shaders/", "bin"),
     shader!("shaders/", "bindings"),
     shader!("shaders/", "capture"),
+    shader!("shaders/", "column"),
     shader!("shaders/", "fragment"),
     shader!("shaders/", "lanes"),
     shader!("shaders/", "lanes_subgroup"),
@@ -26,14 +28,18 @@ pub(super) const OWN: &[Shader] = &[
     shader!("shaders/", "scan"),
     shader!("shaders/", "state"),
     shader!("shaders/", "touch"),
+    shader!("shaders/", "value"),
     shader!("shaders/", "wide"),
 ];
 
-/// The shader of a name, of the device's own or of the kits'.
+/// The shader of a name: generated, of the device's own, or of the kits'.
 ///
 /// # Panics
 /// Where there is none: a fault of the crate's own, or of a design's shader.
 pub fn named(name: &str) -> Shader {
+    if let Some(generated) = loaders::named(name) {
+        return generated;
+    }
     let all = OWN.iter().chain(SHADERS);
     *all.clone().find(|s| s.name == name).unwrap_or_else(|| {
         let names = all.map(|s| s.name).collect::<Vec<_>>().join(" ");

@@ -5,6 +5,7 @@ use wgpu::naga::front::wgsl;
 use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
 
 use super::device::Gpu;
+use super::loaders;
 use super::replay::source;
 use super::shader::defect::{self, Defect};
 use super::shader::{self, OWN};
@@ -28,9 +29,14 @@ fn validate(text: &str, name: &str) {
     }
 }
 
-fn types(bytes: [u32; 12]) -> Vec<(String, Constant)> {
-    let name = |id: ColumnId| format!("{}_BYTES", id.name().to_uppercase());
-    ColumnId::ALL.into_iter().zip(bytes).map(|(id, b)| (name(id), Constant::Whole(b))).collect()
+/// Columns as they are stored at `samples` samples, or constants.
+fn types(stored: bool, samples: u32) -> Vec<(String, Constant)> {
+    let bytes = |id: ColumnId| match stored {
+        true => id.narrowest(samples).bytes() as u32,
+        false => 0,
+    };
+    let constant = |id| (loaders::bytes_constant(id), Constant::Whole(bytes(id)));
+    ColumnId::ALL.into_iter().map(constant).collect()
 }
 
 /// Every value of every choice, each alone.
@@ -64,7 +70,7 @@ fn trace(samples: u32) -> Trace {
         colour: ColourFormat::F16,
         source: "test".to_string(),
         camera: "none".to_string(),
-        constants: Default::default(),
+        ..Header::default()
     };
     let mut random = Stream::new([0xdef, samples]);
     let place = "test";
@@ -86,6 +92,7 @@ fn trace(samples: u32) -> Trace {
             alpha,
             primitive: i,
             object: i / 50,
+            ..Fragment::default()
         };
         writer.push(&fragment).unwrap();
     }
@@ -94,7 +101,7 @@ fn trace(samples: u32) -> Trace {
 
 #[test]
 fn every_program_is_valid_at_every_sample_count() {
-    let columns = [types([2, 2, 8, 4, 4, 4, 2, 2, 2, 4, 4, 4]), types([0; 12])];
+    let columns = [types(true, 64), types(false, 64)];
     let trace = trace(64);
     for entry in DESIGNS.iter().filter(|e| e.is_ported()) {
         for (i, design) in variants(entry.info.name).into_iter().enumerate() {

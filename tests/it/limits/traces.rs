@@ -46,6 +46,7 @@ fn write_with(
             alpha,
             primitive: i,
             object: 0,
+            ..Fragment::default()
         };
         writer.push(&fragment).unwrap();
     }

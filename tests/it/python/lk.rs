@@ -123,6 +123,7 @@ fn cases(folder: &Path) -> Vec<Case> {
         alpha: 1.0,
         primitive: 600,
         object: 0,
+        ..Fragment::default()
     });
     let every = (0..3).flat_map(|y| (0..5).map(move |x| (x, y))).collect();
     // Numbers of pixels at the end of the curve: their indices have more than 32 bits.

@@ -21,6 +21,7 @@ fn frame(samples: u32, random: &mut Stream) -> Frame {
         colour_bits: 48,
         opaque: true,
         primitive_depths: None,
+        columns: Default::default(),
     }
 }
 
@@ -87,7 +88,17 @@ fn fragment(random: &mut Stream, samples: u32, depths: Depths) -> Fragment {
         _ => random.unit(),
     };
     let depth = depth(random, depths);
-    Fragment { x: 0, y: 0, coverage, depth, colour, alpha, primitive: 0, object: 0 }
+    Fragment {
+        x: 0,
+        y: 0,
+        coverage,
+        depth,
+        colour,
+        alpha,
+        primitive: 0,
+        object: 0,
+        ..Fragment::default()
+    }
 }
 
 /// Fragments of a tile: none in most pixels, few in some, in one `deepest` of them.
@@ -179,6 +190,7 @@ fn a_layer_that_comes_through_an_opaque_one() {
         alpha,
         primitive: 0,
         object: 0,
+        ..Fragment::default()
     };
     let mut through = flat(1 << 21, 0.5, 9.0);
     through.depth.dzdx = -(1 << 24);

@@ -69,6 +69,7 @@ impl RawFragment {
             alpha: self.alpha.clamp(0.0, 1.0),
             primitive: self.primitive,
             object: self.object,
+            ..Fragment::default()
         }
     }
 }

@@ -64,8 +64,8 @@ fn tally_sum(pair: u32) -> u32 {
 
 // The key of a row: its tile's place and its own within the tile.
 fn key_of(row: u32) -> u32 {
-    let x = column_word(params.x, X_BYTES, row);
-    let y = column_word(params.y, Y_BYTES, row);
+    let x = column_x(row);
+    let y = column_y(row);
     return (slots[tile_at(row)] << 8u) | ((y & 15u) << 4u) | (x & 15u);
 }
 

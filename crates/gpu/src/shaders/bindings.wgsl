@@ -1,13 +1,5 @@
 // What every program of the replay is given.
-
-struct Column {
-    // The first word of the column.
-    at: u32,
-    // A constant column's value.
-    low: u32,
-    high: u32,
-    unused: u32,
-}
+// uses: columns
 
 struct Params {
     background: vec3<f32>,
@@ -36,18 +28,7 @@ struct Params {
     // The lowest bit of the digit that is sorted by, and the number of blocks of keys.
     digit_at: u32,
     blocks: u32,
-    @align(16) x: Column,
-    @align(16) y: Column,
-    @align(16) coverage: Column,
-    @align(16) z: Column,
-    @align(16) dzdx: Column,
-    @align(16) dzdy: Column,
-    @align(16) r: Column,
-    @align(16) g: Column,
-    @align(16) b: Column,
-    @align(16) alpha: Column,
-    @align(16) primitive: Column,
-    @align(16) object: Column,
+    @align(16) columns: Columns,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;

@@ -11,6 +11,7 @@ use crate::contract::promises::Promises;
 use crate::lanes::{Count, Width};
 use screendoor_trace::error::Result;
 use screendoor_trace::param::Values;
+use screendoor_trace::trace::ColumnSet;
 
 /// A design with its parameters still open: what the registry holds.
 pub trait Blueprint: 'static {
@@ -21,6 +22,10 @@ pub trait Blueprint: 'static {
     /// before the design is built, which is counted nowhere: it stands for what an
     /// application knows of its own primitives.
     const PRIMITIVE_DEPTHS: bool = false;
+
+    /// The optional columns that its designs and engines read. Others are not copied to the
+    /// blocks that they draw, nor to a device, and have their defaults in its fragments.
+    const COLUMNS: ColumnSet = ColumnSet::NONE;
 
     /// The design for pixels of `N` samples.
     type At<const N: usize>: Design;

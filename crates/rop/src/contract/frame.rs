@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::contract::primitive_depths::PrimitiveDepths;
 use screendoor_trace::error::Result;
 use screendoor_trace::tile::TileGrid;
-use screendoor_trace::trace::{ColourFormat, Fragment, Trace, Unorm32};
+use screendoor_trace::trace::{ColourFormat, ColumnSet, Fragment, Trace, Unorm32};
 
 /// What a design knows of the frame it draws.
 #[derive(Clone, Debug)]
@@ -24,11 +24,14 @@ pub struct Frame {
     pub opaque: bool,
     /// The primitives' mean depths, for a design that asks for them.
     pub primitive_depths: Option<Arc<PrimitiveDepths>>,
+    /// The optional columns that the design reads.
+    pub columns: ColumnSet,
 }
 
 impl Frame {
     /// The frame of a replay of `trace` at `samples` samples; that there are opaque
-    /// fragments is taken for granted, as is that nobody asks for the primitives' depths:
+    /// fragments is taken for granted, as is that nobody asks for the primitives' depths
+    /// or for optional columns:
     /// [`screendoor_designs::Configured::frame`] finds out.
     ///
     /// # Errors
@@ -46,6 +49,7 @@ impl Frame {
             },
             opaque: true,
             primitive_depths: None,
+            columns: ColumnSet::NONE,
         })
     }
 

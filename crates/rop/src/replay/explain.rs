@@ -140,6 +140,7 @@ impl<'a> Fragments<'a> {
             for i in (0..batch.len()).filter(here) {
                 let mut fragment = batch.fragment(i);
                 fragment.coverage = fragment.coverage & mask;
+                fragment.optional = fragment.optional.only(self.frame.columns);
                 if !fragment.coverage.is_empty() {
                     each(row + i as u64, fragment);
                 }

@@ -221,7 +221,7 @@ impl Window {
         let draw_tile =
             |block: &mut Block, (state, work, _): &mut (Option<TileState>, &Work, usize)| {
                 let mut counts = count.then(EventCounts::default);
-                self.for_each_block(work, SampleMask::first(frame.samples()), block, |block| {
+                self.for_each_block(work, frame, block, |block| {
                     let state = state.get_or_insert_with(|| design.clear(frame.grid, work.tile));
                     let told = counts.as_mut().map_or(Told::Nobody, Told::Counts);
                     design.draw(pass, state, block, told);
@@ -248,10 +248,11 @@ impl Window {
     fn for_each_block(
         &self,
         work: &Work,
-        mask: SampleMask,
+        frame: &Frame,
         block: &mut Block,
         mut each: impl FnMut(&Block),
     ) {
+        let mask = SampleMask::first(frame.samples());
         let mut pass_on = |block: &mut Block| {
             if !block.is_empty() {
                 each(block);
@@ -264,7 +265,7 @@ impl Window {
             let unit = &self.units[run.unit as usize];
             let mut stretches = unit.stretches(run.range.clone());
             loop {
-                let taken = block.gather(self.level, unit.batch(), stretches, mask);
+                let taken = block.gather(self.level, unit.batch(), stretches, mask, frame.columns);
                 stretches = &stretches[taken..];
                 if stretches.is_empty() {
                     break;

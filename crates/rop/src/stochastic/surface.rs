@@ -120,6 +120,7 @@ mod tests {
             alpha: 0.5,
             primitive,
             object,
+            ..Fragment::default()
         }
     }
 

@@ -113,7 +113,17 @@ impl SetUp<'_> {
         let Drawn { triangle, .. } = &self.drawn;
         let (colour, alpha) = self.drawing.shader.shade(triangle, &weights)?;
         let (primitive, object) = (triangle.primitive, triangle.object);
-        Some(Fragment { x, y, coverage, depth, colour, alpha, primitive, object })
+        Some(Fragment {
+            x,
+            y,
+            coverage,
+            depth,
+            colour,
+            alpha,
+            primitive,
+            object,
+            ..Fragment::default()
+        })
     }
 
     /// What our own rasteriser finds: pixels, what is covered of each and the depth there.

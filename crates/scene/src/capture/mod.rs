@@ -125,7 +125,7 @@ impl<'a> Capture<'a> {
             colour: options.colour,
             source: scene.source.clone(),
             camera: camera.description().to_string(),
-            constants: Default::default(),
+            ..Header::default()
         };
         header.check()?;
         if let Some(alpha) = options.alpha {
@@ -330,6 +330,7 @@ impl Job {
                         alpha,
                         primitive: triangle.primitive,
                         object: triangle.object,
+                        ..Fragment::default()
                     });
                 });
             }

@@ -5,11 +5,14 @@
 //! nearest cache, just before they are drawn.
 
 use fearless_simd::{Level, dispatch};
-use half::f16;
 
 use crate::trace::batch::Batch;
-use crate::trace::column::{ChannelColumn, Column, CoverageColumn, Native};
-use crate::trace::fragment::{DepthPlane, Fragment, SampleMask, Unorm32};
+use crate::trace::cells::{Cells, ChannelColumn, CoverageColumn};
+use crate::trace::column::{Column, Native};
+#[cfg(test)]
+use crate::trace::columns::ColumnId;
+use crate::trace::columns::{ColumnSet, columns, with_probe};
+use crate::trace::fragment::{Fragment, SampleMask};
 
 /// Fragments of a block, at most.
 pub const BLOCK: usize = 256;
@@ -18,35 +21,102 @@ pub const BLOCK: usize = 256;
 pub const STRETCH: usize = 16;
 
 /// A column of a block, with room for what a copy writes beyond its end.
-type Values<T> = [T; BLOCK + STRETCH];
+pub type Values<T> = [T; BLOCK + STRETCH];
 
-/// At most [`BLOCK`] fragments, in the order in which they reach the ROP, every column in
-/// one type. A row whose coverage is empty is no fragment: it covers samples that are
-/// not replayed.
-#[derive(Clone, Debug)]
-pub struct Block {
-    len: usize,
-    /// Columns of the pixels, from the left.
-    pub x: Values<u16>,
-    /// Rows of the pixels, from the top.
-    pub y: Values<u16>,
-    /// Covered samples, one bit each.
-    pub coverage: Values<u64>,
-    /// Depths at the pixels' centres, in 2^-32 of the range (unorm32).
-    pub z: Values<u32>,
-    /// Change of depth over a pixel to the right, in the same units.
-    pub dzdx: Values<i32>,
-    /// The same downwards.
-    pub dzdy: Values<i32>,
-    /// Linear red, green and blue.
-    pub colour: [Values<f32>; 3],
-    /// Opacities, 0 to 1.
-    pub alpha: Values<f32>,
-    /// Numbers of the primitives.
-    pub primitive: Values<u32>,
-    /// Numbers of the objects.
-    pub object: Values<u32>,
+/// Makes blocks of the table of columns.
+macro_rules! blocks {
+    (
+        { $($id:ident $name:ident: $type:ty, [$($place:tt)+], $check:ident,
+            $unit:literal, $what:literal;)* }
+        { $($oid:ident $oname:ident: $otype:ty = $default:expr, $ocheck:ident,
+            $ounit:literal, $owhat:literal;)* }
+    ) => {
+        /// At most [`BLOCK`] fragments, in the order in which they reach the ROP, every
+        /// column in one type. A row whose coverage is empty is no fragment: it covers
+        /// samples that are not replayed.
+        #[derive(Clone, Debug)]
+        pub struct Block {
+            len: usize,
+            $(#[doc = $what] pub $name: Values<<$type as Cells>::Value>,)*
+            // Of an optional column nothing is there until somebody asks for a value.
+            $(#[doc = $owhat] pub $oname: Option<Box<Values<<$otype as Cells>::Value>>>,)*
+        }
+
+        impl Default for Block {
+            fn default() -> Self {
+                let none = Fragment::default();
+                Block {
+                    len: 0,
+                    $($name: [none.$($place)+; BLOCK + STRETCH],)*
+                    $($oname: None,)*
+                }
+            }
+        }
+
+        impl Block {
+            /// Adds a fragment.
+            ///
+            /// # Panics
+            /// Where it is full.
+            pub fn push(&mut self, fragment: &Fragment) {
+                let i = self.len;
+                assert!(i < BLOCK, "the block is full");
+                $(self.$name[i] = fragment.$($place)+;)*
+                $(
+                    let value = fragment.optional.$oname;
+                    match &mut self.$oname {
+                        Some(values) => values[i] = value,
+                        None if value == $default => {}
+                        none => none.insert(Box::new([$default; BLOCK + STRETCH]))[i] = value,
+                    }
+                )*
+                self.len += 1;
+            }
+
+            /// Row `i`.
+            ///
+            /// # Panics
+            /// Where `i` is not below [`BLOCK`].
+            #[inline]
+            pub fn fragment(&self, i: usize) -> Fragment {
+                let mut fragment = Fragment::default();
+                $(fragment.$($place)+ = self.$name[i];)*
+                $(if let Some(values) = &self.$oname {
+                    fragment.optional.$oname = values[i];
+                })*
+                fragment
+            }
+
+            /// Copies stretches to the end, of optional columns those of `columns`.
+            #[inline(always)]
+            fn put(
+                &mut self,
+                batch: &Batch,
+                list: &[Stretch],
+                mask: SampleMask,
+                columns: ColumnSet,
+            ) {
+                let from = Stretches { at: self.len, list };
+                $(batch.$name.copy(from, &mut self.$name, mask);)*
+                $(
+                    let column = batch.$oname.as_ref();
+                    let column = column.filter(|_| columns.contains(ColumnId::$oid));
+                    match (column, &mut self.$oname) {
+                        (Some(column), values) => {
+                            let room = || Box::new([$default; BLOCK + STRETCH]);
+                            column.copy(from, values.get_or_insert_with(room), mask);
+                        }
+                        (None, Some(values)) => from.fill($default, values),
+                        (None, None) => {}
+                    }
+                )*
+                // Where no column is optional.
+                let _ = columns;
+            }
+        }
+    };
 }
+columns!(blocks);
 
 /// At most [`STRETCH`] rows of a batch, one after the other.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -71,25 +141,6 @@ impl Stretch {
     #[inline]
     pub fn count(self) -> usize {
         self.0 as usize % STRETCH + 1
-    }
-}
-
-impl Default for Block {
-    fn default() -> Self {
-        const ROOM: usize = BLOCK + STRETCH;
-        Block {
-            len: 0,
-            x: [0; ROOM],
-            y: [0; ROOM],
-            coverage: [0; ROOM],
-            z: [0; ROOM],
-            dzdx: [0; ROOM],
-            dzdy: [0; ROOM],
-            colour: [[0.0; ROOM]; 3],
-            alpha: [0.0; ROOM],
-            primitive: [0; ROOM],
-            object: [0; ROOM],
-        }
     }
 }
 
@@ -120,42 +171,6 @@ impl Block {
         self.len = 0;
     }
 
-    /// Adds a fragment.
-    ///
-    /// # Panics
-    /// Where it is full.
-    pub fn push(&mut self, fragment: &Fragment) {
-        let i = self.len;
-        assert!(i < BLOCK, "the block is full");
-        let Fragment { x, y, coverage, depth, colour, alpha, primitive, object } = *fragment;
-        (self.x[i], self.y[i], self.coverage[i]) = (x, y, coverage.0);
-        (self.z[i], self.dzdx[i], self.dzdy[i]) = (depth.z.0, depth.dzdx, depth.dzdy);
-        for (values, channel) in self.colour.iter_mut().zip(colour) {
-            values[i] = channel;
-        }
-        (self.alpha[i], self.primitive[i], self.object[i]) = (alpha, primitive, object);
-        self.len += 1;
-    }
-
-    /// Row `i`.
-    ///
-    /// # Panics
-    /// Where `i` is not below [`BLOCK`].
-    #[inline]
-    pub fn fragment(&self, i: usize) -> Fragment {
-        let [r, g, b] = &self.colour;
-        Fragment {
-            x: self.x[i],
-            y: self.y[i],
-            coverage: SampleMask(self.coverage[i]),
-            depth: DepthPlane { z: Unorm32(self.z[i]), dzdx: self.dzdx[i], dzdy: self.dzdy[i] },
-            colour: [r[i], g[i], b[i]],
-            alpha: self.alpha[i],
-            primitive: self.primitive[i],
-            object: self.object[i],
-        }
-    }
-
     /// The fragments in order.
     #[inline]
     pub fn iter(&self) -> impl Iterator<Item = Fragment> + '_ {
@@ -163,14 +178,16 @@ impl Block {
         rows.map(|i| self.fragment(i))
     }
 
-    /// Adds stretches of `batch` while there is room, their coverage within `mask`, with the
-    /// instructions of `level`; tells how many.
+    /// Adds stretches of `batch` while there is room, their coverage within `mask`, and of
+    /// optional columns those in `columns` that it has, with the instructions of `level`;
+    /// tells how many.
     pub fn gather(
         &mut self,
         level: Level,
         batch: &Batch,
         stretches: &[Stretch],
         mask: SampleMask,
+        columns: ColumnSet,
     ) -> usize {
         let (mut end, mut taken) = (self.len, 0);
         for stretch in stretches {
@@ -181,67 +198,32 @@ impl Block {
             taken += 1;
         }
         let list = &stretches[..taken];
-        dispatch!(level, _ => self.put(batch, list, mask));
+        dispatch!(level, _ => self.put(batch, list, mask, columns));
         self.len = end;
         taken
-    }
-
-    #[inline(always)]
-    fn put(&mut self, batch: &Batch, list: &[Stretch], mask: SampleMask) {
-        let from = Stretches { at: self.len, list };
-        from.put(&batch.x, &mut self.x, same);
-        from.put(&batch.y, &mut self.y, same);
-        let coverage = &mut self.coverage;
-        match &batch.coverage {
-            CoverageColumn::U8(c) => from.put_masks(c, coverage, mask),
-            CoverageColumn::U16(c) => from.put_masks(c, coverage, mask),
-            CoverageColumn::U32(c) => from.put_masks(c, coverage, mask),
-            CoverageColumn::U64(c) => from.put_masks(c, coverage, mask),
-        }
-        from.put(&batch.z, &mut self.z, same);
-        from.put(&batch.dzdx, &mut self.dzdx, same);
-        from.put(&batch.dzdy, &mut self.dzdy, same);
-        for (values, column) in self.colour.iter_mut().zip(&batch.colour) {
-            match column {
-                ChannelColumn::F16(c) => from.put(c, values, widen),
-                ChannelColumn::F32(c) => from.put(c, values, same),
-            }
-        }
-        from.put(&batch.alpha, &mut self.alpha, same);
-        from.put(&batch.primitive, &mut self.primitive, same);
-        from.put(&batch.object, &mut self.object, same);
     }
 }
 
 /// Rows of a batch that go to a block, from place `at` on.
 #[derive(Clone, Copy)]
-struct Stretches<'a> {
+pub struct Stretches<'a> {
     at: usize,
     list: &'a [Stretch],
 }
 
 impl Stretches<'_> {
-    /// Copies masks, as far as they lie within another.
+    /// The same value in all rows.
     #[inline(always)]
-    fn put_masks<T: Native + Into<u64>>(
-        self,
-        column: &Column<T>,
-        to: &mut Values<u64>,
-        mask: SampleMask,
-    ) {
-        self.put(
-            column,
-            to,
-            #[inline(always)]
-            |v| v.into() & mask.0,
-        );
+    fn fill<T: Copy>(self, value: T, to: &mut Values<T>) {
+        let count: usize = self.list.iter().map(|s| s.count()).sum();
+        to[self.at..self.at + count].fill(value);
     }
 
     /// Copies a column's values. A whole stretch's worth is copied for each, however short
     /// it is, and what is too much is written over by the next: a length known when this
     /// is compiled is worth more than a copy that ends where it should.
     #[inline(always)]
-    fn put<T: Native, U: Copy>(
+    pub fn put<T: Native, U: Copy>(
         self,
         column: &Column<T>,
         to: &mut Values<U>,
@@ -249,10 +231,7 @@ impl Stretches<'_> {
     ) {
         let mut at = self.at;
         match column {
-            Column::Constant(value) => {
-                let count: usize = self.list.iter().map(|s| s.count()).sum();
-                to[at..at + count].fill(change(*value));
-            }
+            Column::Constant(value) => self.fill(change(*value), to),
             Column::Values(values) => {
                 let values: &[T] = values;
                 for stretch in self.list {
@@ -278,42 +257,24 @@ impl Stretches<'_> {
     }
 }
 
-/// For columns that are copied as they are.
-#[inline(always)]
-fn same<T>(value: T) -> T {
-    value
-}
-
-/// A finite half-precision value in single precision, exactly. The multiplication by
-/// 2^112 moves one format's exponents, denormals included, to the other's; unlike
-/// `f16::to_f32` it asks for no instruction that a machine may lack.
-#[inline(always)]
-fn widen(value: f16) -> f32 {
-    const SCALE: f32 = f32::from_bits((112 + 127) << 23);
-    let bits = u32::from(value.to_bits());
-    let magnitude = f32::from_bits((bits & 0x7fff) << 13) * SCALE;
-    f32::from_bits(magnitude.to_bits() | (bits & 0x8000) << 16)
-}
-
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeMap;
-
     use super::*;
     use crate::random::Stream;
     use crate::trace::batch::BatchBuilder;
-    use crate::trace::{ColourFormat, ColumnId, Header, SamplePattern, Scalar};
-
-    #[test]
-    fn every_finite_half_is_widened_exactly() {
-        for value in (0..=u16::MAX).map(f16::from_bits).filter(|v| v.is_finite()) {
-            assert_eq!(widen(value).to_bits(), value.to_f32().to_bits(), "{value}");
-        }
-    }
+    use crate::trace::{
+        ColourFormat, DepthPlane, Header, OptionalValues, SamplePattern, Scalar, Unorm32,
+    };
 
     /// A batch of random fragments, with columns of all types: masks for so many samples,
-    /// colours in either precision, and two constants or none.
-    fn batch(random: &mut Stream, samples: u32, colour: ColourFormat, constants: bool) -> Batch {
+    /// colours in either precision, two constants or none, and an optional column or not.
+    fn batch(
+        random: &mut Stream,
+        samples: u32,
+        colour: ColourFormat,
+        constants: bool,
+        optional: bool,
+    ) -> Batch {
         let mut header = Header {
             width: 1 << 16,
             height: 1 << 16,
@@ -326,11 +287,14 @@ mod tests {
             colour,
             source: String::new(),
             camera: String::new(),
-            constants: BTreeMap::new(),
+            ..Header::default()
         };
         if constants {
             header.constants.insert(ColumnId::X, Scalar::Unsigned(7));
             header.constants.insert(ColumnId::Alpha, Scalar::Real(0.25));
+        }
+        if optional {
+            header.optional.insert(ColumnId::Probe);
         }
         let mut builder = BatchBuilder::new(&header).unwrap();
         for _ in 0..100 {
@@ -348,6 +312,7 @@ mod tests {
                 alpha: if constants { 0.25 } else { random.unit() },
                 primitive: random.word(),
                 object: random.word(),
+                optional: OptionalValues { probe: if optional { random.unit() } else { 0.5 } },
             };
             builder.push(&fragment).unwrap();
         }
@@ -361,10 +326,14 @@ mod tests {
         let mut random = Stream::new([3]);
         for samples in [1, 8, 16, 32, 64] {
             for colour in [ColourFormat::F16, ColourFormat::F32] {
-                for (constants, level) in
-                    [(false, Level::new()), (true, Level::new()), (false, Level::fallback())]
-                {
-                    let batch = batch(&mut random, samples, colour, constants);
+                for (constants, optional, columns, level) in [
+                    (false, false, ColumnSet::NONE, Level::new()),
+                    (true, true, ColumnSet::NONE, Level::new()),
+                    (false, true, ColumnSet::ALL, Level::new()),
+                    (true, false, ColumnSet::ALL, Level::new()),
+                    (false, true, ColumnSet::ALL, Level::fallback()),
+                ] {
+                    let batch = batch(&mut random, samples, colour, constants, optional);
                     let mask = SampleMask::first(samples.div_ceil(2));
                     let stretch = |_| {
                         let count = 1 + random.below(STRETCH as u32) as usize;
@@ -373,15 +342,16 @@ mod tests {
                     };
                     let stretches: Vec<Stretch> = (0..60).map(stretch).collect();
                     let mut block = Block::default();
-                    let first = block.gather(level, &batch, &stretches[..3], mask);
-                    let more = block.gather(level, &batch, &stretches[3..], mask);
+                    let first = block.gather(level, &batch, &stretches[..3], mask, columns);
+                    let more = block.gather(level, &batch, &stretches[3..], mask, columns);
                     let (taken, left) = stretches.split_at(first + more);
                     assert!(first == 3 && block.rows() + left[0].count() > BLOCK);
                     let rows = taken.iter().flat_map(|s| s.start()..s.start() + s.count());
                     let expected: Vec<Fragment> = rows
                         .map(|row| {
-                            let fragment = batch.fragment(row);
-                            Fragment { coverage: fragment.coverage & mask, ..fragment }
+                            let f = batch.fragment(row);
+                            let optional = f.optional.only(columns);
+                            Fragment { coverage: f.coverage & mask, optional, ..f }
                         })
                         .collect();
                     let found: Vec<Fragment> =
@@ -389,8 +359,39 @@ mod tests {
                     assert_eq!(found, expected);
                     let covered = expected.iter().filter(|f| !f.coverage.is_empty());
                     assert!(block.iter().eq(covered.copied()));
+                    // What is not asked for, or not there, takes no memory.
+                    let read = optional && columns.contains(ColumnId::Probe);
+                    assert_eq!(block.probe.is_some(), read);
                 }
             }
         }
+    }
+
+    /// A block that has had values of an optional column serves a batch that has none, and
+    /// fragments one by one.
+    #[test]
+    fn a_block_is_filled_again_without_what_it_held() {
+        let mut random = Stream::new([4]);
+        let mut batch = |optional| batch(&mut random, 8, ColourFormat::F16, false, optional);
+        let (with, without) = (batch(true), batch(false));
+        let mut block = Block::default();
+        let stretches = [Stretch::new(0, 16), Stretch::new(40, 9)];
+        let all = SampleMask::first(8);
+        block.gather(Level::new(), &with, &stretches, all, ColumnSet::ALL);
+        block.clear();
+        block.gather(Level::new(), &without, &stretches, all, ColumnSet::ALL);
+        for fragment in with.iter().take(3) {
+            block.push(&fragment);
+        }
+        let rows = (0..16).chain(40..49).map(|row| without.fragment(row));
+        let expected: Vec<Fragment> = rows.chain((0..3).map(|row| with.fragment(row))).collect();
+        let found: Vec<Fragment> = (0..block.rows()).map(|i| block.fragment(i)).collect();
+        assert_eq!(found, expected);
+        // One by one, too, it is made when a fragment has a value.
+        let mut block = Block::default();
+        block.push(&without.fragment(0));
+        assert!(block.probe.is_none());
+        block.push(&with.fragment(1));
+        assert_eq!([block.fragment(0), block.fragment(1)], [without.fragment(0), with.fragment(1)]);
     }
 }

@@ -1,90 +1,10 @@
-//! The columns of a trace: their names, types and values.
+//! The types and values of columns, and columns in memory.
 
 use std::fmt;
 
-use arrow_buffer::{ArrowNativeType, Buffer, ScalarBuffer};
+use arrow_buffer::{ArrowNativeType, ScalarBuffer};
 use arrow_schema::DataType;
 use half::f16;
-
-use crate::trace::fragment::MAX_SAMPLES;
-
-/// A column of a trace.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
-#[repr(usize)]
-pub enum ColumnId {
-    /// Pixel column.
-    X,
-    /// Pixel row.
-    Y,
-    /// Covered samples, one bit each.
-    Coverage,
-    /// Depth at the pixel's centre.
-    Z,
-    /// Depth change per pixel to the right.
-    Dzdx,
-    /// Depth change per pixel downwards.
-    Dzdy,
-    /// Linear red.
-    R,
-    /// Linear green.
-    G,
-    /// Linear blue.
-    B,
-    /// Opacity.
-    Alpha,
-    /// Primitive number.
-    Primitive,
-    /// Object number.
-    Object,
-}
-
-impl ColumnId {
-    /// All columns, in the order in which they stand in a file.
-    pub const ALL: [ColumnId; 12] = {
-        use ColumnId::*;
-        [X, Y, Coverage, Z, Dzdx, Dzdy, R, G, B, Alpha, Primitive, Object]
-    };
-
-    /// The column's name in a file.
-    pub const fn name(self) -> &'static str {
-        use ColumnId::*;
-        match self {
-            X => "x",
-            Y => "y",
-            Coverage => "coverage",
-            Z => "z",
-            Dzdx => "dzdx",
-            Dzdy => "dzdy",
-            R => "r",
-            G => "g",
-            B => "b",
-            Alpha => "alpha",
-            Primitive => "primitive",
-            Object => "object",
-        }
-    }
-
-    /// The types it may have in a file whose pixels have `samples` samples.
-    pub fn accepts(self, value_type: ValueType, samples: u32) -> bool {
-        use ColumnId::*;
-        match self {
-            X | Y => value_type == ValueType::U16,
-            Coverage => value_type.is_unsigned() && value_type.bytes() as u32 * 8 >= samples,
-            Z | Primitive | Object => value_type == ValueType::U32,
-            Dzdx | Dzdy => value_type == ValueType::I32,
-            R | G | B => matches!(value_type, ValueType::F16 | ValueType::F32),
-            Alpha => value_type == ValueType::F32,
-        }
-    }
-
-    /// The narrowest type it may have.
-    pub fn narrowest(self, samples: u32) -> ValueType {
-        *ValueType::ALL
-            .iter()
-            .find(|t| self.accepts(**t, samples.min(MAX_SAMPLES)))
-            .expect("every column accepts some type for up to 64 samples")
-    }
-}
 
 /// The type of a column's values.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -121,7 +41,7 @@ impl ValueType {
         }
     }
 
-    fn is_unsigned(self) -> bool {
+    pub(crate) fn is_unsigned(self) -> bool {
         matches!(self, ValueType::U8 | ValueType::U16 | ValueType::U32 | ValueType::U64)
     }
 
@@ -164,20 +84,6 @@ pub enum Scalar {
     Real(f32),
 }
 
-impl Scalar {
-    /// Reads the decimal text of a value of `column`.
-    pub fn parse(column: ColumnId, text: &str) -> Option<Self> {
-        use ColumnId::*;
-        match column {
-            Dzdx | Dzdy => text.parse().ok().map(Scalar::Signed),
-            R | G | B | Alpha => text.parse().ok().map(Scalar::Real),
-            X | Y => text.parse::<u16>().ok().map(|v| Scalar::Unsigned(v.into())),
-            Z | Primitive | Object => text.parse::<u32>().ok().map(|v| Scalar::Unsigned(v.into())),
-            Coverage => text.parse().ok().map(Scalar::Unsigned),
-        }
-    }
-}
-
 /// Decimal, in the shortest form that reads back as the same value.
 impl fmt::Display for Scalar {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -190,7 +96,7 @@ impl fmt::Display for Scalar {
 }
 
 /// A type that a column's values can have, in memory as in a file.
-pub trait Native: ArrowNativeType + PartialEq {
+pub trait Native: ArrowNativeType + PartialEq + std::str::FromStr {
     /// Its name in the format.
     const TYPE: ValueType;
     /// The value as a scalar.
@@ -259,30 +165,4 @@ impl<T: Native> Column<T> {
             Column::Values(v) => v,
         }
     }
-
-    /// The bytes of its rows as they stand in a file; `None` for a constant.
-    pub(crate) fn buffer(&self) -> Option<(ValueType, &Buffer)> {
-        match self {
-            Column::Constant(_) => None,
-            Column::Values(v) => Some((T::TYPE, v.inner())),
-        }
-    }
-}
-
-/// Coverage masks in the narrowest type that the file gives them.
-#[derive(Clone, Debug)]
-#[allow(missing_docs)]
-pub enum CoverageColumn {
-    U8(Column<u8>),
-    U16(Column<u16>),
-    U32(Column<u32>),
-    U64(Column<u64>),
-}
-
-/// A colour channel in half or single precision.
-#[derive(Clone, Debug)]
-#[allow(missing_docs)]
-pub enum ChannelColumn {
-    F16(Column<f16>),
-    F32(Column<f32>),
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::trace::column::ColumnId;
+use crate::trace::columns::ColumnId;
 use crate::trace::seal::CHECKSUMS;
 
 /// Hashes a trace's content as its batches pass: BLAKE3 over the entries of the

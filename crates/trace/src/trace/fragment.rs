@@ -5,6 +5,8 @@ use std::ops::{BitAnd, BitOr, BitOrAssign};
 
 use serde::{Serialize, Serializer};
 
+use crate::trace::columns::OptionalValues;
+
 /// The most samples a pixel can have.
 pub const MAX_SAMPLES: u32 = 64;
 
@@ -159,7 +161,10 @@ impl DepthPlane {
 }
 
 /// One row of a trace: what one primitive leaves in one pixel.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+///
+/// Where one is written down, `..Fragment::default()` at its end keeps the text good when
+/// columns are added.
+#[derive(Clone, Copy, PartialEq, Debug, Default, Serialize)]
 pub struct Fragment {
     /// Column of the pixel, from the left.
     pub x: u16,
@@ -177,6 +182,9 @@ pub struct Fragment {
     pub primitive: u32,
     /// The object's number in the scene.
     pub object: u32,
+    /// Values of the columns that a trace may lack.
+    #[serde(flatten)]
+    pub optional: OptionalValues,
 }
 
 #[cfg(test)]

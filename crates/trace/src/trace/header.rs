@@ -1,11 +1,12 @@
 //! What a trace says about itself: frame, samples, background, origin.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::Serialize;
 
 use crate::error::{Error, Result};
-use crate::trace::column::{ColumnId, Scalar, ValueType};
+use crate::trace::column::{Scalar, ValueType};
+use crate::trace::columns::ColumnId;
 use crate::trace::fragment::MAX_SAMPLES;
 
 /// The version of the format that this crate writes; it reads every version
@@ -16,7 +17,7 @@ pub const FORMAT_VERSION: &str = "1.0";
 pub const MAX_SIDE: u32 = 1 << 16;
 
 /// Where a pixel's samples lie.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+#[derive(Clone, PartialEq, Eq, Debug, Default, Serialize)]
 pub struct SamplePattern {
     /// The pattern's name, for people.
     pub name: String,
@@ -81,7 +82,10 @@ pub enum ColourFormat {
 }
 
 /// What a trace says about itself.
-#[derive(Clone, PartialEq, Debug, Serialize)]
+///
+/// Where one is written down, `..Header::default()` at its end keeps the text good when fields
+/// are added; a default alone has no pixels and passes no [`Header::check`].
+#[derive(Clone, PartialEq, Debug, Default, Serialize)]
 pub struct Header {
     /// Frame width in pixels, 1 to 65536.
     pub width: u32,
@@ -100,6 +104,10 @@ pub struct Header {
     /// Columns that have one value in all rows; they have no column in the file.
     #[serde(skip)]
     pub constants: BTreeMap<ColumnId, Scalar>,
+    /// Optional columns that the trace has, stored or constant; in a file it follows from
+    /// these.
+    #[serde(skip)]
+    pub optional: BTreeSet<ColumnId>,
 }
 
 const DEPTH_CONVENTION: &str = "unorm32 near=0 far=4294967295 less-equal";
@@ -123,22 +131,26 @@ mod key {
 impl Header {
     /// The type of `column`'s values in a file with this header.
     pub fn value_type(&self, column: ColumnId) -> ValueType {
-        match column {
-            ColumnId::R | ColumnId::G | ColumnId::B => match self.colour {
-                ColourFormat::F16 => ValueType::F16,
-                ColourFormat::F32 => ValueType::F32,
-            },
-            _ => column.narrowest(self.pattern.samples()),
+        let samples = self.pattern.samples();
+        match self.colour {
+            ColourFormat::F32 if column.accepts(ValueType::F16, samples) => ValueType::F32,
+            _ => column.narrowest(samples),
         }
+    }
+
+    /// Whether a trace with this header has `column`, stored or constant.
+    pub fn has(&self, column: ColumnId) -> bool {
+        !column.is_optional() || self.optional.contains(&column)
+    }
+
+    /// Whether it stores `column`, a value for each row.
+    pub fn stores(&self, column: ColumnId) -> bool {
+        self.has(column) && !self.constants.contains_key(&column)
     }
 
     /// How many bytes one fragment takes in an uncompressed file.
     pub fn row_bytes(&self) -> usize {
-        ColumnId::ALL
-            .iter()
-            .filter(|c| !self.constants.contains_key(c))
-            .map(|c| self.value_type(*c).bytes())
-            .sum()
+        ColumnId::ALL.iter().filter(|c| self.stores(**c)).map(|c| self.value_type(*c).bytes()).sum()
     }
 
     /// Checks the rules that its fields' types do not enforce.
@@ -167,6 +179,13 @@ impl Header {
             return Err(Error::config(
                 "a sample lies outside its pixel",
                 "offsets are -8 to 7 sixteenths of a pixel",
+            ));
+        }
+        let unnamed = |id: &&ColumnId| !self.has(**id);
+        if let Some(id) = self.constants.keys().find(unnamed) {
+            return Err(Error::config(
+                format_args!("'{}' is constant and not among the optional columns", id.name()),
+                "name it in the header's optional columns",
             ));
         }
         if !self.background.iter().all(|c| c.is_finite()) {
@@ -240,7 +259,7 @@ impl Header {
         for column in ColumnId::ALL {
             let name = format!("{}{}", key::CONSTANT, column.name());
             if let Some(text) = map.get(&name) {
-                let value = Scalar::parse(column, text);
+                let value = column.parse(text);
                 let value = value.ok_or_else(|| reader.bad(&name, "a value of the column"))?;
                 constants.insert(column, value);
             }
@@ -259,6 +278,7 @@ impl Header {
             colour: ColourFormat::default(),
             source: reader.text(key::SOURCE)?.to_string(),
             camera: reader.text(key::CAMERA)?.to_string(),
+            optional: constants.keys().copied().filter(|id| id.is_optional()).collect(),
             constants,
         };
         header.check().map_err(|e| match e {
@@ -334,6 +354,7 @@ mod tests {
                 (ColumnId::Object, Scalar::Unsigned(9)),
             ]
             .into(),
+            ..Header::default()
         }
     }
 

@@ -17,7 +17,7 @@ use arrow_ipc::{
 
 use crate::error::{Error, Result};
 use crate::trace::batch::MAX_BATCH_ROWS;
-use crate::trace::column::ColumnId;
+use crate::trace::columns::ColumnId;
 use crate::trace::decompress::decompress;
 use crate::trace::other::refuse_other_formats;
 use crate::trace::seal::damaged;

@@ -11,12 +11,16 @@ compile_error!("traces are little-endian and are read without conversion");
 
 mod batch;
 mod block;
+mod cells;
 mod column;
+mod columns;
 mod content;
 mod decompress;
 mod fragment;
 mod header;
 mod layout;
+#[cfg(test)]
+mod optional;
 mod other;
 mod read;
 mod seal;
@@ -30,7 +34,9 @@ mod write;
 pub use batch::{Batch, MAX_BATCH_ROWS};
 pub use block::{BLOCK, Block};
 pub use block::{STRETCH, Stretch};
-pub use column::{ChannelColumn, Column, ColumnId, CoverageColumn, Native, Scalar, ValueType};
+pub use cells::{ChannelColumn, CoverageColumn};
+pub use column::{Column, Native, Scalar, ValueType};
+pub use columns::{ColumnId, ColumnKind, ColumnSet, OptionalValues};
 pub use fragment::{DepthPlane, Fragment, MAX_SAMPLES, SampleMask, Unorm32};
 pub use header::{ColourFormat, FORMAT_VERSION, Header, MAX_SIDE, SamplePattern};
 pub use read::{Checksums, Trace};

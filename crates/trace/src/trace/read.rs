@@ -13,8 +13,10 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
-use crate::trace::batch::{Batch, Source};
-use crate::trace::column::{ColumnId, ValueType};
+use crate::trace::batch::Batch;
+use crate::trace::cells::Source;
+use crate::trace::column::ValueType;
+use crate::trace::columns::ColumnId;
 use crate::trace::content::ContentHasher;
 use crate::trace::header::Header;
 use crate::trace::layout::{BatchLayout, Block, Layout};
@@ -219,7 +221,7 @@ impl Trace {
     }
 
     /// The columns that are stored, in the file's order, and the types as which they are
-    /// read; the others are constant.
+    /// read; the others are constant, or optional and absent.
     pub fn columns(&self) -> &[(ColumnId, ValueType)] {
         &self.inner.columns
     }
@@ -317,9 +319,10 @@ impl Trace {
                 Some(((column, values), (_, value_type))) => {
                     stored(id, &values[..layout.rows * column.stored.bytes()]);
                     let values = column.convert(*value_type, values, layout.rows, &place)?;
-                    Source::Bytes(*value_type, values)
+                    Some(Source::Bytes(*value_type, values))
                 }
-                None => Source::Constant(inner.header.constants[&id]),
+                // An optional column is neither, where the trace lacks it.
+                None => inner.header.constants.get(&id).copied().map(Source::Constant),
             })
         })?;
         batch.check(&inner.header, &place)?;

@@ -14,7 +14,8 @@ use arrow_ipc::{Field, Precision, Type};
 use half::f16;
 
 use crate::error::{Error, Result};
-use crate::trace::column::{ColumnId, ValueType};
+use crate::trace::column::ValueType;
+use crate::trace::columns::{ColumnId, ColumnKind};
 use crate::trace::header::{ColourFormat, Header};
 
 /// Children within children of a column, at most.
@@ -76,18 +77,17 @@ impl StoredType {
 
     /// The type as which `id` is read from it; `None` where that would be a guess.
     fn read_as(self, id: ColumnId, samples: u32) -> Option<ValueType> {
-        use ColumnId::*;
         if let Some(own) = self.own().filter(|own| id.accepts(*own, samples)) {
             return Some(own);
         }
-        match (id, self) {
-            (R | G | B | Alpha, StoredType::Real(_)) => Some(ValueType::F32),
+        match (id.kind(), self) {
+            (ColumnKind::Real, StoredType::Real(_)) => Some(ValueType::F32),
             // A mask narrower than the samples cannot name them all.
-            (Coverage, StoredType::Signed(bytes)) => {
+            (ColumnKind::Mask, StoredType::Signed(bytes)) => {
                 let same = StoredType::Unsigned(bytes).own()?;
                 id.accepts(same, samples).then_some(same)
             }
-            (R | G | B | Alpha | Coverage, _) | (_, StoredType::Real(_)) => None,
+            (ColumnKind::Real | ColumnKind::Mask, _) | (_, StoredType::Real(_)) => None,
             _ => Some(id.narrowest(samples)),
         }
     }
@@ -166,7 +166,9 @@ impl StoredColumns {
             let stored = self.list.iter().any(|column| column.id == id);
             let what = match (stored, header.constants.contains_key(&id)) {
                 (true, true) => format!("'{}' is both a column and a constant", id.name()),
-                (false, false) => format!("the column '{}' is missing", id.name()),
+                (false, false) if !id.is_optional() => {
+                    format!("the column '{}' is missing", id.name())
+                }
                 _ => continue,
             };
             let hint = "correct the writer of the trace (docs/TRACE_FORMAT.md)";
@@ -181,9 +183,11 @@ impl StoredColumns {
         };
         let list = self.list.iter().map(read).collect::<Result<Vec<_>>>()?;
         let single = |(id, value_type): &(ColumnId, ValueType)| {
-            matches!(id, ColumnId::R | ColumnId::G | ColumnId::B) && *value_type == ValueType::F32
+            id.accepts(ValueType::F16, samples) && *value_type == ValueType::F32
         };
         let single = list.iter().any(single);
+        let present = list.iter().map(|(id, _)| *id).chain(header.constants.keys().copied());
+        header.optional = present.filter(|id| id.is_optional()).collect();
         header.colour = if single { ColourFormat::F32 } else { ColourFormat::F16 };
         Ok(list)
     }

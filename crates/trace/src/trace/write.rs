@@ -10,7 +10,7 @@ use arrow_schema::{ArrowError, SchemaRef};
 use crate::error::{Error, Result};
 use crate::output::OutputFile;
 use crate::trace::batch::{BatchBuilder, MAX_BATCH_ROWS, schema};
-use crate::trace::column::ColumnId;
+use crate::trace::columns::ColumnId;
 use crate::trace::content::ContentHasher;
 use crate::trace::fragment::Fragment;
 use crate::trace::header::Header;
@@ -110,7 +110,7 @@ impl<W: Write> TraceWriter<W> {
             builder: BatchBuilder::new(&header)?,
             content: ContentHasher::new(
                 &header.to_metadata(),
-                ColumnId::ALL.into_iter().filter(|id| !header.constants.contains_key(id)),
+                ColumnId::ALL.into_iter().filter(|id| header.stores(*id)),
             ),
             header,
             schema,
@@ -130,16 +130,26 @@ impl<W: Write> TraceWriter<W> {
     ///
     /// # Errors
     /// [`Error::Invalid`] for a fragment that no trace may hold (it is found when
-    /// its batch is full) or that breaks a declared constant; [`Error::Io`] where
+    /// its batch is full) or that breaks a declared constant, or has a value of an optional column that the
+    /// header does not name; [`Error::Io`] where
     /// the sink fails.
     #[inline]
     pub fn push(&mut self, fragment: &Fragment) -> Result<()> {
         if let Err(column) = self.builder.push(fragment) {
-            return Err(Error::invalid(
-                format_args!("{}, row {}", self.place, self.rows + self.builder.len() as u64),
-                format_args!("'{}' is declared constant and is not", column.name()),
-                "declare only columns that are constant",
-            ));
+            let place = format!("{}, row {}", self.place, self.rows + self.builder.len() as u64);
+            let name = column.name();
+            return Err(match self.header.has(column) {
+                true => Error::invalid(
+                    place,
+                    format_args!("'{name}' is declared constant and is not"),
+                    "declare only columns that are constant",
+                ),
+                false => Error::invalid(
+                    place,
+                    format_args!("it has a value of '{name}', which the header does not name"),
+                    "name it in the header's optional columns",
+                ),
+            });
         }
         if self.builder.len() == self.batch_rows {
             self.flush_batch()?;

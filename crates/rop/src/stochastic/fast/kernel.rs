@@ -160,7 +160,7 @@ pub(super) fn draw_samples<S: Simd, F: FastSampler<N>, P: Sum, const N: usize>(
         let (z, written) = flawed(simd, engine.flaw, z, written, passed);
         let depth = LanesOf::<S, N>::select(written, z, stored);
         depth.store(held.depth.as_mut());
-        for (row, channel) in held.colour.iter_mut().zip(&block.colour) {
+        for (row, channel) in held.colour.iter_mut().zip([&block.r, &block.g, &block.b]) {
             let new = LanesOf::<S, N>::splat(simd, channel[i].to_bits() as i32);
             let old = LanesOf::<S, N>::load(simd, row.as_ref());
             LanesOf::<S, N>::select(written, new, old).store(row.as_mut());

@@ -45,6 +45,7 @@ fn fragments(samples: u32) -> Vec<Fragment> {
         alpha: random.unit(),
         primitive: 0,
         object: 0,
+        ..Fragment::default()
     };
     masks.into_iter().map(fragment).collect()
 }
@@ -74,6 +75,7 @@ where
         colour_bits: 96,
         opaque: true,
         primitive_depths: None,
+        columns: Default::default(),
     };
     // As `lk` has it.
     let values = Values::resolve("lk", PARAMS, &[]).unwrap();

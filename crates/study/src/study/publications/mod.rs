@@ -155,7 +155,7 @@ fn whole_layers(
         colour: ColourFormat::F32,
         source: format!("{} whole layers", layers.len()),
         camera: "none".to_string(),
-        constants: Default::default(),
+        ..Header::default()
     };
     let mut writer = TraceWriter::new(Vec::new(), "memory", header, WriteOptions::default())?;
     for (i, (colour, alpha)) in layers.iter().enumerate() {
@@ -169,6 +169,7 @@ fn whole_layers(
                 alpha: *alpha,
                 primitive: i as u32,
                 object: i as u32,
+                ..Fragment::default()
             })?;
         }
     }

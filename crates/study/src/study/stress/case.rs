@@ -151,7 +151,7 @@ impl Case {
             colour: self.colour,
             source: format!("hard case: {}", self.name),
             camera: "none".to_string(),
-            constants: Default::default(),
+            ..Header::default()
         };
         let options = WriteOptions::default();
         let mut writer = TraceWriter::new(Vec::new(), "memory", header, options)?;
@@ -207,6 +207,7 @@ pub(super) fn layer(i: u32, colour: [f32; 3], alpha: f32) -> Fragment {
         alpha,
         primitive: i,
         object: i,
+        ..Fragment::default()
     }
 }
 

@@ -240,7 +240,7 @@ mod tests {
             colour: ColourFormat::F16,
             source: "test".into(),
             camera: "none".into(),
-            constants: Default::default(),
+            ..Header::default()
         };
         let options = WriteOptions { batch_rows, ..WriteOptions::default() };
         let mut writer = TraceWriter::new(Vec::new(), "test", header, options).unwrap();
@@ -249,7 +249,18 @@ mod tests {
             let coverage = SampleMask(*coverage);
             let (primitive, object) = (i as u32, 0);
             let (colour, alpha) = ([1.0; 3], 0.5);
-            let f = Fragment { x: *x, y: 1, coverage, depth, colour, alpha, primitive, object };
+            let optional = Default::default();
+            let f = Fragment {
+                x: *x,
+                y: 1,
+                coverage,
+                depth,
+                colour,
+                alpha,
+                primitive,
+                object,
+                optional,
+            };
             writer.push(&f).unwrap();
         }
         Trace::from_bytes(writer.finish().unwrap().0, "test").unwrap()

@@ -1,0 +1,355 @@
+//! How a column's values are held: in a batch, while a batch is built, and in a block.
+//!
+//! A column of one type holds it everywhere. Masks and colour channels are held in the
+//! width that the file gives them, and widened when they are read.
+
+use std::fmt;
+
+use arrow_buffer::{Buffer, ScalarBuffer};
+use half::f16;
+
+use crate::trace::block::{Stretches, Values};
+use crate::trace::column::{Column, Native, Scalar, ValueType};
+use crate::trace::columns::ColumnKind;
+use crate::trace::fragment::SampleMask;
+
+/// Where a batch's column comes from: the header's constant, or the bytes and type that a
+/// file gives it.
+pub enum Source {
+    Constant(Scalar),
+    Bytes(ValueType, Buffer),
+}
+
+/// A column as a batch holds it.
+pub trait Cells: Sized {
+    /// What its values are.
+    const KIND: ColumnKind;
+    /// A value as fragments and blocks have it.
+    type Value: Copy + PartialEq + fmt::Debug;
+    /// The column under construction.
+    type Growing: fmt::Debug;
+
+    /// The types it may have in a file whose pixels have `samples` samples.
+    fn accepts(value_type: ValueType, samples: u32) -> bool;
+    /// Reads the decimal text of a value.
+    fn parse(text: &str) -> Option<Scalar>;
+    /// A value as a scalar.
+    fn scalar(value: Self::Value) -> Scalar;
+    /// The column of `len` rows. Buffers hold at least as many values of a type that the
+    /// column accepts.
+    fn assemble(len: usize, source: Source) -> Self;
+    /// The value in row `i`.
+    fn value(&self, i: usize) -> Self::Value;
+    /// The bytes of its rows as they stand in a file; `None` for a constant.
+    fn bytes(&self) -> Option<(ValueType, &Buffer)>;
+    /// Begins a column that is kept in this type; `None` where the constant is no value of it.
+    fn grow(value_type: ValueType, constant: Option<Scalar>) -> Option<Self::Growing>;
+    /// Adds a value; tells whether it could be kept.
+    fn push(growing: &mut Self::Growing, value: Self::Value) -> bool;
+    /// The values so far; the growing column is empty after.
+    fn take(growing: &mut Self::Growing) -> Self;
+    /// Copies rows to a block, masks as far as they lie within `mask`.
+    fn copy(&self, from: Stretches<'_>, to: &mut Values<Self::Value>, mask: SampleMask);
+}
+
+impl<T: Native> Cells for Column<T> {
+    const KIND: ColumnKind = match T::TYPE {
+        ValueType::F16 | ValueType::F32 => ColumnKind::Real,
+        _ => ColumnKind::Whole,
+    };
+    type Value = T;
+    type Growing = Growing<T>;
+
+    fn accepts(value_type: ValueType, _: u32) -> bool {
+        value_type == T::TYPE
+    }
+
+    fn parse(text: &str) -> Option<Scalar> {
+        text.parse().ok().map(T::scalar)
+    }
+
+    fn scalar(value: T) -> Scalar {
+        value.scalar()
+    }
+
+    fn assemble(len: usize, source: Source) -> Self {
+        match source {
+            Source::Constant(scalar) => Column::Constant(
+                T::from_scalar(scalar).expect("constants are parsed for their column"),
+            ),
+            Source::Bytes(value_type, bytes) => {
+                assert_eq!(value_type, T::TYPE);
+                Column::Values(aligned(len, bytes))
+            }
+        }
+    }
+
+    #[inline]
+    fn value(&self, i: usize) -> T {
+        self.get(i)
+    }
+
+    fn bytes(&self) -> Option<(ValueType, &Buffer)> {
+        match self {
+            Column::Constant(_) => None,
+            Column::Values(v) => Some((T::TYPE, v.inner())),
+        }
+    }
+
+    fn grow(_: ValueType, constant: Option<Scalar>) -> Option<Growing<T>> {
+        let constant = match constant {
+            None => None,
+            Some(scalar) => Some(T::from_scalar(scalar)?),
+        };
+        Some(Growing { constant, values: Vec::new() })
+    }
+
+    #[inline]
+    fn push(growing: &mut Growing<T>, value: T) -> bool {
+        match growing.constant {
+            Some(constant) => constant == value,
+            None => {
+                growing.values.push(value);
+                true
+            }
+        }
+    }
+
+    fn take(growing: &mut Growing<T>) -> Self {
+        match growing.constant {
+            Some(v) => Column::Constant(v),
+            None => {
+                let capacity = growing.values.capacity();
+                let full = std::mem::replace(&mut growing.values, Vec::with_capacity(capacity));
+                Column::Values(full.into())
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn copy(&self, from: Stretches<'_>, to: &mut Values<T>, _: SampleMask) {
+        from.put(
+            self,
+            to,
+            #[inline(always)]
+            |v| v,
+        );
+    }
+}
+
+/// A column under construction.
+#[derive(Debug)]
+pub struct Growing<T: Native> {
+    constant: Option<T>,
+    values: Vec<T>,
+}
+
+/// The first `len` values of `bytes`, without a copy where they are aligned.
+fn aligned<T: Native>(len: usize, bytes: Buffer) -> ScalarBuffer<T> {
+    let size = T::TYPE.bytes();
+    if bytes.as_ptr().align_offset(size) == 0 {
+        ScalarBuffer::new(bytes, 0, len)
+    } else {
+        // Buffers of their own are aligned to at least 8 bytes.
+        ScalarBuffer::new(Buffer::from_slice_ref(&bytes.as_slice()[..len * size]), 0, len)
+    }
+}
+
+/// A type in which values of a wider one can be stored.
+trait Narrow<Wide>: Native {
+    fn wide(self) -> Wide;
+    fn narrow(value: Wide) -> Self;
+}
+
+macro_rules! masks {
+    ($($native:ty),+) => {
+        $(#[allow(clippy::useless_conversion)]
+        impl Narrow<u64> for $native {
+            #[inline(always)]
+            fn wide(self) -> u64 {
+                self.into()
+            }
+            // A bit beyond the column's width is a sample that does not exist: the mask
+            // becomes empty, which the check of the finished batch refuses.
+            #[inline]
+            fn narrow(mask: u64) -> Self {
+                Self::try_from(mask).unwrap_or(0)
+            }
+        })+
+    };
+}
+masks!(u8, u16, u32, u64);
+
+impl Narrow<f32> for f16 {
+    #[inline(always)]
+    fn wide(self) -> f32 {
+        widen(self)
+    }
+    #[inline]
+    fn narrow(value: f32) -> Self {
+        f16::from_f32(value)
+    }
+}
+
+impl Narrow<f32> for f32 {
+    #[inline(always)]
+    fn wide(self) -> f32 {
+        self
+    }
+    #[inline]
+    fn narrow(value: f32) -> Self {
+        value
+    }
+}
+
+/// A finite half-precision value in single precision, exactly. The multiplication by
+/// 2^112 moves one format's exponents, denormals included, to the other's; unlike
+/// `f16::to_f32` it asks for no instruction that a machine may lack.
+#[inline(always)]
+fn widen(value: f16) -> f32 {
+    const SCALE: f32 = f32::from_bits((112 + 127) << 23);
+    let bits = u32::from(value.to_bits());
+    let magnitude = f32::from_bits((bits & 0x7fff) << 13) * SCALE;
+    f32::from_bits(magnitude.to_bits() | (bits & 0x8000) << 16)
+}
+
+/// A column whose values are stored in one of several types and read as the widest.
+macro_rules! either {
+    (
+        $(#[$meta:meta])*
+        $name:ident, $growing:ident of $wide:ty, $kind:ident:
+        $($variant:ident($native:ty)),+; widest $last:ident;
+        accepts ($type:ident, $samples:ident) => $accepts:expr;
+        copied ($value:ident, $mask:ident) => $copied:expr
+    ) => {
+        $(#[$meta])*
+        #[derive(Clone, Debug)]
+        #[allow(missing_docs)]
+        pub enum $name {
+            $($variant(Column<$native>),)+
+            $last(Column<$wide>),
+        }
+
+        #[derive(Debug)]
+        pub enum $growing {
+            $($variant(Growing<$native>),)+
+            $last(Growing<$wide>),
+        }
+
+        impl Cells for $name {
+            const KIND: ColumnKind = ColumnKind::$kind;
+            type Value = $wide;
+            type Growing = $growing;
+
+            fn accepts($type: ValueType, $samples: u32) -> bool {
+                $accepts
+            }
+
+            fn parse(text: &str) -> Option<Scalar> {
+                Column::<$wide>::parse(text)
+            }
+
+            fn scalar(value: $wide) -> Scalar {
+                value.scalar()
+            }
+
+            fn assemble(len: usize, source: Source) -> Self {
+                match source {
+                    $(Source::Bytes(ValueType::$variant, _) => {
+                        $name::$variant(Column::assemble(len, source))
+                    })+
+                    _ => $name::$last(Column::assemble(len, source)),
+                }
+            }
+
+            #[inline]
+            fn value(&self, i: usize) -> $wide {
+                match self {
+                    $($name::$variant(column) => column.get(i).wide(),)+
+                    $name::$last(column) => column.get(i),
+                }
+            }
+
+            fn bytes(&self) -> Option<(ValueType, &Buffer)> {
+                match self {
+                    $($name::$variant(column) => column.bytes(),)+
+                    $name::$last(column) => column.bytes(),
+                }
+            }
+
+            fn grow(value_type: ValueType, constant: Option<Scalar>) -> Option<$growing> {
+                Some(match value_type {
+                    $(ValueType::$variant => {
+                        $growing::$variant(Column::<$native>::grow(value_type, constant)?)
+                    })+
+                    _ => $growing::$last(Column::<$wide>::grow(value_type, constant)?),
+                })
+            }
+
+            #[inline]
+            fn push(growing: &mut $growing, value: $wide) -> bool {
+                match growing {
+                    $($growing::$variant(column) => {
+                        Column::push(column, <$native>::narrow(value))
+                    })+
+                    $growing::$last(column) => Column::push(column, value),
+                }
+            }
+
+            fn take(growing: &mut $growing) -> Self {
+                match growing {
+                    $($growing::$variant(column) => $name::$variant(Column::take(column)),)+
+                    $growing::$last(column) => $name::$last(Column::take(column)),
+                }
+            }
+
+            #[inline(always)]
+            fn copy(&self, from: Stretches<'_>, to: &mut Values<$wide>, mask: SampleMask) {
+                #[inline(always)]
+                fn copied($value: $wide, $mask: SampleMask) -> $wide {
+                    $copied
+                }
+                match self {
+                    $($name::$variant(column) => from.put(
+                        column,
+                        to,
+                        #[inline(always)]
+                        |v| copied(v.wide(), mask),
+                    ),)+
+                    $name::$last(column) => from.put(
+                        column,
+                        to,
+                        #[inline(always)]
+                        |v| copied(v, mask),
+                    ),
+                }
+            }
+        }
+    };
+}
+
+either! {
+    /// Coverage masks in the narrowest type that the file gives them.
+    CoverageColumn, GrowingCoverage of u64, Mask: U8(u8), U16(u16), U32(u32); widest U64;
+    accepts (t, samples) => t.is_unsigned() && t.bytes() as u32 * 8 >= samples;
+    copied (value, mask) => value & mask.0
+}
+
+either! {
+    /// A colour channel in half or single precision.
+    ChannelColumn, GrowingChannel of f32, Real: F16(f16); widest F32;
+    accepts (t, _samples) => matches!(t, ValueType::F16 | ValueType::F32);
+    copied (value, _mask) => value
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_finite_half_is_widened_exactly() {
+        for value in (0..=u16::MAX).map(f16::from_bits).filter(|v| v.is_finite()) {
+            assert_eq!(widen(value).to_bits(), value.to_f32().to_bits(), "{value}");
+        }
+    }
+}
