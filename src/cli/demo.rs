@@ -12,12 +12,15 @@ use crate::cli::capture::record;
 use crate::cli::console::{Console, grouped, shown, table};
 use crate::cli::files::{Json, JsonArgument, check, check_scene, report, write_pictures};
 use crate::cli::kind::{Kind, check_output};
-use crate::design::{Configured, configure};
+use crate::design::{Configured, REFERENCE, configure};
 use crate::error::{Error, Result};
 use crate::output::OutputFile;
-use crate::picture::PictureFile;
+use crate::picture::{Picture, PictureFile};
 use crate::scene;
-use crate::study::{Measured, Measurements, Plan, Run, measure};
+use crate::study::engine::FAST;
+use crate::study::measure::{Measured, Reference, Setup, Subject, measure};
+use crate::study::record::{Record, Speed};
+use crate::study::throughput::Spread;
 use crate::trace::{Trace, WriteOptions};
 
 /// Do the main job on a built-in scene: capture it, replay it through 'lk' and
@@ -48,7 +51,7 @@ struct Document<'a> {
     fragments: u64,
     width: u32,
     height: u32,
-    runs: Vec<&'a Run>,
+    runs: Vec<&'a Record>,
 }
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
@@ -57,11 +60,10 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     check_output(folder, Kind::Folder)?;
     scene::check(source)?;
     let designs = DESIGNS.map(|d| configure(d, &[])).into_iter().collect::<Result<Vec<_>>>()?;
-    let plan = Plan { designs, samples: SAMPLES.to_vec(), seeds: SEEDS };
     let path = folder.join("trace.arrow");
     // Before the check: names of files are compared within folders that exist.
     std::fs::create_dir_all(folder).map_err(|e| Error::io("create", folder, e))?;
-    let names = picture_paths(folder, &plan.designs);
+    let names = picture_paths(folder, &designs);
     let outputs = names.iter().chain([&path]).map(|p| &**p).chain(arguments.json.path());
     let outputs: Vec<&Path> = outputs.collect();
     check(scene_path.as_slice(), &outputs)?;
@@ -92,12 +94,8 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         shown(path.display())
     ));
     let trace = Trace::open(&path)?;
-    let progress = console.progress("replaying", "replays");
-    let measured = measure(&trace, &plan, 512 << 20, |what, done, total| {
-        progress.name(what);
-        progress.set(done, total);
-    })?;
-    drop(progress);
+    let content = trace.content().map(ToString::to_string);
+    let measured = Measurements::of(source, trace, &designs, console)?;
 
     say(format_args!(
         "\nerror against exact, RMSE in 8-bit units of the pixels that hold fragments, {SEEDS} seeds"
@@ -119,17 +117,54 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     }
     let document = Document {
         scene: source,
-        content: trace.content(),
+        content: content.as_deref(),
         fragments,
         width: SIDE,
         height: SIDE,
-        runs: measured.runs.iter().map(|m| &m.run).collect(),
+        runs: measured.runs.iter().map(|m| &m.record).collect(),
     };
     // The text has been printed.
     let reported = json.map_or(Ok(()), |json| {
         report(Some(json), "screendoor.demo", &document, console, || Ok(()))
     });
     saved.and(reported).and(said)
+}
+
+/// What is measured: the runs, sample count after sample count, and the exact picture at each.
+struct Measurements {
+    runs: Vec<Measured>,
+    references: Vec<Picture>,
+}
+
+impl Measurements {
+    fn of(scene: &str, trace: Trace, designs: &[Configured], console: &Console) -> Result<Self> {
+        const MEMORY: u64 = 512 << 20;
+        let progress = console.progress("replaying", "runs");
+        let total = (SAMPLES.len() * (designs.len() + 1) + 1) as u64;
+        let mut done = 0;
+        let mut tell = |what: &str| {
+            progress.name(what);
+            progress.set(done, total);
+            done += 1;
+        };
+        tell(REFERENCE);
+        let subject = Subject::new(scene, trace, None, MEMORY)?;
+        let setup = Setup { engine: FAST, seeds: 0..SEEDS, metrics: &[] };
+        let mut measured = Measurements { runs: Vec::new(), references: Vec::new() };
+        for samples in SAMPLES {
+            tell(&format!("{REFERENCE} at {samples}"));
+            let reference = Reference::of(&subject, samples, setup.metrics)?;
+            for design in designs {
+                tell(&format!("{} at {samples}", design.label()));
+                let mut run = measure(&subject, &reference, design, &setup)?;
+                let seconds = Spread::of(&run.seconds);
+                run.record.speed.insert("fast".to_string(), Speed { seconds, ..Speed::default() });
+                measured.runs.push(run);
+            }
+            measured.references.push(reference.picture);
+        }
+        Ok(measured)
+    }
 }
 
 /// Names that every file system takes.
@@ -154,7 +189,8 @@ fn picture_paths(folder: &Path, designs: &[Configured]) -> Vec<PathBuf> {
 fn save(mut files: Vec<PictureFile>, measured: &Measurements, console: &Console) -> Result<()> {
     let mut rest = files.chunks_mut(2);
     for (m, pair) in measured.runs.iter().zip(rest.by_ref()) {
-        let at = SAMPLES.iter().position(|s| *s == m.run.samples).expect("a sample count of ours");
+        let at =
+            SAMPLES.iter().position(|s| *s == m.record.samples).expect("a sample count of ours");
         write_pictures(pair, &m.picture, Some(&measured.references[at]), console)?;
     }
     if let (Some(exact), Some(reference)) = (rest.next(), measured.references.last()) {
@@ -167,8 +203,8 @@ fn save(mut files: Vec<PictureFile>, measured: &Measurements, console: &Console)
 fn comparison(runs: &[Measured]) -> Option<String> {
     let samples = SAMPLES[SAMPLES.len() - 1];
     let noise = |design: &str| {
-        let run = runs.iter().find(|m| m.run.design == design && m.run.samples == samples)?;
-        Some(run.run.covered.rmse.value).filter(|_| run.run.covered.pixels > 0)
+        let run = runs.iter().find(|m| m.record.design == design && m.record.samples == samples)?;
+        Some(run.record.covered.rmse.value).filter(|_| run.record.covered.pixels > 0)
     };
     let [lk, stratified, naive] = DESIGNS.map(noise);
     let (by_stratified, by_naive) = (lk? / stratified?, lk? / naive?);
@@ -194,7 +230,8 @@ fn error_table(runs: &[Measured]) -> comfy_table::Table {
         "state bits/pixel",
     ];
     let rows = runs.iter().map(|m| {
-        let (run, e) = (&m.run, &m.run.covered);
+        let (run, e) = (&m.record, &m.record.covered);
+        let seconds = run.speed.values().find_map(|s| s.seconds).map_or(f64::NAN, |s| s.median);
         let fragments = run.events.fragments as f64;
         // Where there is no fragment there is nothing to say of one.
         let known = |text: String| if run.events.fragments == 0 { "-".to_string() } else { text };
@@ -205,7 +242,7 @@ fn error_table(runs: &[Measured]) -> comfy_table::Table {
             known(format!("{:.2} ± {:.2}", e.rmse.value, e.rmse.half_width())),
             known(format!("{:.2}", e.rmse_srgb.value)),
             known(format!("{:+.3}", e.mean.value)),
-            known(format!("{:.1} M", fragments / run.seconds / 1e6)),
+            known(format!("{:.1} M", fragments / seconds / 1e6)),
             known(format!("{:.2}", run.events.hashes as f64 / fragments)),
             known(format!("{:.1}", (read + written) as f64 / fragments)),
             run.state_bits.total().to_string(),

@@ -16,6 +16,7 @@ use crate::param::Values;
 use crate::picture::{Picture, PictureFile};
 use crate::rop::{EventCounts, Layout, Promises, ReplayOptions, Replayed, StateBits};
 use crate::study::engine::{EngineName, OnGpu};
+use crate::study::measure::replays;
 use crate::trace::Trace;
 
 /// Replay a trace through a design: a picture, its error, what the ROP did
@@ -120,12 +121,13 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let errors = match &reference {
         None => None,
         Some(reference) => {
-            let pictures = seeds.skip(1).map(|seed| {
+            let plain = ReplayOptions { count_events: false, ..options };
+            let others = seeds.skip(1).inspect(|seed| {
                 let place = seed - arguments.run.seed + 1;
                 progress.name(&format!("seed {place} of {}", arguments.seeds));
-                let plain = ReplayOptions { count_events: false, ..options };
-                Ok(engine.replay(&design, &trace, samples, seed, &plain)?.0.picture)
             });
+            let replayed = replays(&engine, &design, &trace, samples, others, plain);
+            let pictures = replayed.map(|seed| Ok(seed?.replayed.picture));
             Some(by_region(&trace, samples, reference, &first.picture, pictures)?)
         }
     };

@@ -15,6 +15,7 @@ use crate::output::OutputFile;
 use crate::param::Options;
 use crate::report::{Against, Document, PARTS, check_marks, document, in_short, results};
 use crate::study::file::Publication;
+use crate::study::publications::experiment::Lab;
 use crate::study::publications::{Effort, measure_publication};
 
 /// Rerun the publications' experiments and write RESULTS.md with its figures: half an hour on
@@ -41,6 +42,10 @@ pub(super) struct Arguments {
     /// the views of table 1; claims about variants have half of it
     #[arg(long, default_value_t = 96, value_name = "PIXELS", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(32..=4096))]
     comparison_side: u32,
+    /// Where runs are kept as they are measured; those that are there are not measured again.
+    /// Without it they are kept in the output's folder until the results are written
+    #[arg(long, value_name = "FOLDER")]
+    runs: Option<PathBuf>,
     /// Measure only this part; the others stay in RESULTS.md as they are
     #[arg(long, value_name = "PART", value_parser = part)]
     part: Option<Publication>,
@@ -51,12 +56,15 @@ pub(super) struct Arguments {
     json: JsonArgument,
 }
 
+/// The folder within the output's for runs while the results are not written.
+const OWN: &str = ".screendoor-runs";
+
 #[derive(Serialize)]
 struct Written<'a> {
     results: String,
     figures: Vec<String>,
     /// Scenes whose models are not in the models' folder.
-    missing: &'a [&'static str],
+    missing: &'a [String],
     parts: Vec<Part<'a>>,
 }
 
@@ -156,19 +164,22 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         about(minutes(effort, arguments.part, threads)),
         path.display()
     ));
-    on_interrupt(|| {
-        "nothing was written, and what was measured is lost; --part measures a part".to_string()
+    let own = arguments.output.join(OWN);
+    let runs = arguments.runs.as_deref().unwrap_or(&own);
+    on_interrupt({
+        let runs = runs.display().to_string();
+        move || format!("the runs that are done are kept in {runs}; the same command goes on")
     });
     let progress = console.progress("reproducing", "steps");
-    let models = arguments.models.as_deref();
+    let watch = |what: &str, done, total| {
+        progress.name(what);
+        progress.set(done, total);
+    };
+    let lab = Lab { folder: runs, models: arguments.models.as_deref(), watch: &watch };
     let mut documents: Vec<(Publication, Document)> = Vec::new();
     let mut missing = Vec::new();
     for part in PARTS.into_iter().filter(|p| arguments.part.is_none_or(|only| only == *p)) {
-        let watch = |what: &str, done, total| {
-            progress.name(what);
-            progress.set(done, total);
-        };
-        let measured = measure_publication(part, models, effort, watch)?;
+        let measured = measure_publication(part, &lab, effort)?;
         missing.extend_from_slice(measured.missing());
         documents.push((part, document(&measured, "figures")));
     }
@@ -190,6 +201,10 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         // What has been measured is not lost.
         console.print(format_args!("{text}"))?;
         return Err(error);
+    }
+    if arguments.runs.is_none() {
+        // What stays is taken up by the next call of the same version with the same settings.
+        let _ = std::fs::remove_dir_all(&own);
     }
     let written = Written {
         results: path.display().to_string(),

@@ -15,6 +15,7 @@ use crate::param::Options;
 use crate::report::html::{DesignText, answer};
 use crate::report::{About, PAGE, document, write_report};
 use crate::study::file::Study;
+use crate::study::publications::experiment::Lab;
 use crate::study::publications::{Effort, measure_publication};
 use crate::study::results::{Missing, Results};
 use crate::study::run::{Runner, Shard, Store, Task, agree, check};
@@ -155,7 +156,9 @@ fn publications(runner: &Runner<'_>) -> Result<Vec<(String, String)>> {
         let told = |what: &str, _, _| {
             (runner.watch)(&format!("{}: {what}", publication.name()), done, total as u64);
         };
-        match measure_publication(*publication, None, Effort::brief(), told) {
+        let lab =
+            Lab { folder: &store.publication_folder(*publication), models: None, watch: &told };
+        match measure_publication(*publication, &lab, Effort::brief()) {
             Ok(reproduced) => {
                 let document = document(&reproduced, ".");
                 for (name, drawn) in &document.figures {
@@ -164,6 +167,7 @@ fn publications(runner: &Runner<'_>) -> Result<Vec<(String, String)>> {
                 Store::put(&store.against_file(*publication), &document.against)?;
                 let path = store.document_file(*publication);
                 OutputFile::put(path, document.markdown.as_bytes())?;
+                lab.forget_traces();
             }
             Err(error) => failed.push((publication.name().to_string(), error.to_string())),
         }

@@ -34,7 +34,7 @@ pub(super) fn text(text: &mut String, p: &Publications) {
             .iter()
             .map(|table| {
                 let (few, many) = (runs(table, 4), runs(table, 64));
-                let mut row = vec![table.name.to_string()];
+                let mut row = vec![table.scene.name.to_string()];
                 row.extend((0..3).map(|i| {
                     format!("{:.1}", few[i].covered.rmse.value / many[i].covered.rmse.value)
                 }));
@@ -57,13 +57,17 @@ pub(super) fn text(text: &mut String, p: &Publications) {
         .map(|table| {
             let mut worst = [0.0_f64; 2];
             for (n, [a, b]) in COUNTS.iter().zip(table.stands_for.rmse()) {
-                let [lk, e, naive] = runs(table, *n).map(|r| r.rmse_fine.value);
+                let [lk, e, naive] = runs(table, *n).map(|r| r.fine.value);
                 for (worst, other) in worst.iter_mut().zip([e, naive]) {
                     *worst = worst.max((lk / other - a / b).abs());
                 }
             }
-            nearer.push((table.name, worst[1] < worst[0]));
-            vec![table.name.to_string(), format!("{:.2}", worst[0]), format!("{:.2}", worst[1])]
+            nearer.push((table.scene.name.as_str(), worst[1] < worst[0]));
+            vec![
+                table.scene.name.to_string(),
+                format!("{:.2}", worst[0]),
+                format!("{:.2}", worst[1]),
+            ]
         })
         .collect();
     let nearer = holding(nearer.into_iter());
@@ -117,7 +121,7 @@ fn views(text: &mut String, p: &Publications) {
         .map(|v| {
             let [lk, e, naive] = v.rmse;
             vec![
-                v.scene.to_string(),
+                v.scene.clone(),
                 v.what.clone(),
                 format!("{:.1}", v.fragments_per_pixel),
                 format!("{:.0} %", 100.0 * v.edge_share),
@@ -162,7 +166,7 @@ fn seen_as(
     of: fn(&Variation) -> Estimate,
 ) -> OnScenes {
     let chosen = seen.iter().filter(|v| which(v.aspect));
-    OnScenes(chosen.map(|v| (v.scene.to_string(), of(v))).collect())
+    OnScenes(chosen.map(|v| (v.scene.clone(), of(v))).collect())
 }
 
 /// The same in frames of a size other than the rest has.
@@ -232,7 +236,7 @@ mod tests {
     fn seen(scene: &'static str, aspect: Aspect, rmse: [f64; 3]) -> Variation {
         let known = |v: f64| Estimate { value: v, low: v * 0.999, high: v * 1.001 };
         Variation {
-            scene,
+            scene: scene.to_string(),
             aspect,
             what: "made up".to_string(),
             fragments_per_pixel: 1.0,

@@ -8,9 +8,11 @@ use crate::results::against::{Against, Agreement, above, below};
 use crate::results::ratios::{Holding, OnScenes, holding};
 use crate::results::{plain, ratio};
 use screendoor_study::metrics::{Estimate, student_t};
+use screendoor_study::study::measure::BLOCK;
 use screendoor_study::study::publications::claims::{
-    BLOCK, Claims, DITHERED, HASH_ROUNDS, STRATIFIED, TABLE, Trial, Variant,
+    Claims, DITHERED, HASH_ROUNDS, STRATIFIED, TABLE, Trial,
 };
+use screendoor_study::study::record::Record;
 
 /// Ratios of RMSE nearer to 1 than this are called the same.
 pub(super) const SAME: f64 = 0.02;
@@ -19,15 +21,15 @@ pub(super) const SAME: f64 = 0.02;
 const CHANCE: f64 = 0.01;
 
 /// What of a variant is held against another.
-pub(super) type Of = fn(&Variant) -> Estimate;
-pub(super) const RMSE: Of = |v| v.errors.rmse;
+pub(super) type Of = fn(&Record) -> Option<Estimate>;
+pub(super) const RMSE: Of = |v| Some(v.covered.rmse);
 const BLOCKS: Of = |v| v.blocks;
 
 /// A figure of one variant ÷ that of another, on every scene that has both.
 pub(super) fn ratios(trial: &Trial, of: Of, [over, under]: [&str; 2]) -> OnScenes {
     let scenes = trial.scenes.iter().filter_map(|scene| {
         let (a, b) = scene.variant(over).zip(scene.variant(under))?;
-        Some((scene.name.to_string(), of(a).ratio(of(b))))
+        Some((scene.name.clone(), of(a)?.ratio(of(b)?)))
     });
     OnScenes(scenes.collect())
 }
@@ -37,16 +39,16 @@ pub(super) fn ratios(trial: &Trial, of: Of, [over, under]: [&str; 2]) -> OnScene
 fn centred(trial: &Trial, design: &str, tests: usize) -> Holding {
     let bound = student_t(1.0 - CHANCE / tests.max(1) as f64, trial.seeds as usize);
     holding(trial.scenes.iter().filter_map(|scene| {
-        let mean = scene.variant(design)?.errors.mean;
+        let mean = scene.variant(design)?.covered.mean;
         let still = mean.value.abs() < 1e-9;
         let off = if still { 0.0 } else { mean.standard_errors(trial.seeds as usize) };
-        Some((scene.name, off <= bound))
+        Some((scene.name.as_str(), off <= bound))
     }))
 }
 
 /// The largest mean error over the scenes, in 8-bit units.
 fn farthest(trial: &Trial, design: &str) -> f64 {
-    let means = trial.scenes.iter().filter_map(|s| s.variant(design).map(|v| v.errors.mean.value));
+    let means = trial.scenes.iter().filter_map(|s| s.variant(design).map(|v| v.covered.mean.value));
     means.fold(0.0, |most: f64, mean| if mean.abs() > most.abs() { mean } else { most })
 }
 
@@ -74,12 +76,14 @@ fn rows(trial: &Trial, designs: &[&str], pairs: &[(Of, [&str; 2])]) -> Vec<Vec<S
         .scenes
         .iter()
         .map(|scene| {
-            let mut row = vec![scene.name.to_string()];
-            let figure = |d: &&str| scene.variant(d).map_or("—".into(), |v| plain(v.errors.rmse));
+            let mut row = vec![scene.name.clone()];
+            let figure =
+                |d: &&str| scene.variant(d).map_or("—".into(), |v| plain(v.covered.rmse));
             row.extend(designs.iter().map(figure));
             row.extend(pairs.iter().map(|(of, [a, b])| {
-                let both = scene.variant(a).zip(scene.variant(b));
-                both.map_or("—".into(), |(a, b)| ratio(of(a), of(b)))
+                let figure = |design: &str| scene.variant(design).and_then(of);
+                let both = figure(a).zip(figure(b));
+                both.map_or("—".into(), |(a, b)| ratio(a, b))
             }));
             row
         })
@@ -95,27 +99,27 @@ fn write_table(text: &mut String, header: &[String], rows: &[Vec<String>]) {
 /// The sections' claims, in their order.
 pub(super) fn against(claims: &Claims) -> Vec<Against> {
     vec![
-        table_of_masks(&claims.table),
-        dithered(&claims.dither),
+        table_of_masks([&claims.variants, &claims.masks]),
+        dithered(&claims.variants),
         rounds_together(&claims.rounds),
-        rounds_of_hashing(&claims.hash_rounds),
+        rounds_of_hashing(&claims.variants),
     ]
 }
 
 /// The sections.
 pub(super) fn text(text: &mut String, claims: &Claims) {
-    table_of_masks(&claims.table).open(text);
-    table_text(text, &claims.table);
-    dithered(&claims.dither).open(text);
-    dithered_text(text, &claims.dither);
+    table_of_masks([&claims.variants, &claims.masks]).open(text);
+    table_text(text, [&claims.variants, &claims.masks]);
+    dithered(&claims.variants).open(text);
+    dithered_text(text, &claims.variants);
     rounds_together(&claims.rounds).open(text);
     rounds_text(text, &claims.rounds);
-    rounds_of_hashing(&claims.hash_rounds).open(text);
-    hashing_text(text, &claims.hash_rounds);
+    rounds_of_hashing(&claims.variants).open(text);
+    hashing_text(text, &claims.variants);
 }
 
 /// Enderton's table of masks beside masks that are computed.
-fn table_of_masks([antialiased, centred_samples]: &[Trial; 2]) -> Against {
+fn table_of_masks([antialiased, centred_samples]: [&Trial; 2]) -> Against {
     let [computed, table, larger, survivors] = TABLE;
     let of = |trial| ratios(trial, RMSE, [table, computed]);
     let (with, without) = (of(antialiased), of(centred_samples));
@@ -171,7 +175,7 @@ fn cause(with: &OnScenes, without: &OnScenes, against_larger: &OnScenes) -> &'st
     }
 }
 
-fn table_text(text: &mut String, [antialiased, centred_samples]: &[Trial; 2]) {
+fn table_text(text: &mut String, [antialiased, centred_samples]: [&Trial; 2]) {
     let [computed, table, ..] = TABLE;
     let _ = writeln!(
         text,
@@ -310,7 +314,7 @@ fn suffices(trial: &Trial, design: &str) -> Holding {
     let same = |of| ratios(trial, of, [design, all]).holding(|e| !above(e, 1.0 + SAME)).each;
     let (pixels, blocks) = (same(RMSE), same(BLOCKS));
     let both = pixels.iter().zip(&blocks).zip(&no_bias.each).map(|((a, b), c)| *a && *b && *c);
-    holding(trial.scenes.iter().map(|s| s.name).zip(both))
+    holding(trial.scenes.iter().map(|s| s.name.as_str()).zip(both))
 }
 
 /// Rounds of figure 4's hash.
@@ -366,13 +370,13 @@ fn hashing_text(text: &mut String, trial: &Trial) {
     for scene in &trial.scenes {
         for (rounds, design) in (1..).zip(HASH_ROUNDS) {
             let Some((own, four)) = scene.variant(design).zip(scene.variant(all)) else { continue };
-            let mean = own.errors.mean;
+            let mean = own.covered.mean;
             list.push(vec![
-                scene.name.to_string(),
+                scene.name.clone(),
                 format!("{rounds}"),
-                plain(own.errors.rmse),
-                ratio(own.errors.rmse, four.errors.rmse),
-                ratio(own.blocks, four.blocks),
+                plain(own.covered.rmse),
+                ratio(own.covered.rmse, four.covered.rmse),
+                own.blocks.zip(four.blocks).map_or("—".into(), |(a, b)| ratio(a, b)),
                 format!("{:+.3} ± {:.3}", mean.value, mean.half_width()),
             ]);
         }

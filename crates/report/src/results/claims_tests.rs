@@ -1,8 +1,7 @@
 //! Verdicts on made-up numbers, both ways.
 
 use super::*;
-use screendoor_study::metrics::EnsembleErrors;
-use screendoor_study::study::publications::claims::TriedScene;
+use screendoor_study::study::analysis::made_up;
 
 /// An estimate known to a thousandth of it.
 fn known(value: f64) -> Estimate {
@@ -11,19 +10,13 @@ fn known(value: f64) -> Estimate {
 }
 
 /// A variant with an RMSE, the same over blocks, and a mean error.
-pub(in crate::results) fn variant(design: &str, rmse: f64, blocks: f64, mean: f64) -> Variant {
-    let errors = EnsembleErrors {
-        seeds: 4,
-        pixels: 1000,
-        rmse: known(rmse),
-        rmse_srgb: known(rmse),
-        mean: Estimate { value: mean, low: mean - 0.1, high: mean + 0.1 },
-        max: rmse,
-        variance: Some(rmse * rmse - mean * mean),
-        bias_squared: Some(known(mean * mean)),
-        temporal: None,
-    };
-    Variant { design: design.to_string(), errors, blocks: known(blocks) }
+pub(in crate::results) fn variant(design: &str, rmse: f64, blocks: f64, mean: f64) -> Record {
+    let mut record = made_up::record("", design, 8, known(rmse));
+    record.covered.mean = Estimate { value: mean, low: mean - 0.1, high: mean + 0.1 };
+    record.covered.variance = Some(rmse * rmse - mean * mean);
+    record.covered.bias_squared = Some(known(mean * mean));
+    record.blocks = Some(known(blocks));
+    record
 }
 
 /// A trial of two scenes, its variants from `each(design, scene)`: RMSE, blocks, mean.
@@ -36,7 +29,7 @@ pub(in crate::results) fn made_up(
             let [rmse, blocks, mean] = each(d, i);
             variant(design, rmse, blocks, mean)
         };
-        TriedScene { name, variants: designs.iter().enumerate().map(variant).collect() }
+        made_up::scene(name, designs.iter().enumerate().map(variant).collect())
     };
     let scenes = [(0, "a"), (1, "b")].map(scene).to_vec();
     Trial { samples: 8, side: 64, seeds: 4, antialiased: true, scenes }
@@ -47,7 +40,7 @@ fn a_table_is_acceptable_without_noise_and_bias_and_not_with_either() {
     let trial = |noise: f64, mean: f64| {
         made_up(&TABLE, |d, _| if d == 1 { [10.0 * noise, 5.0, mean] } else { [10.0, 5.0, 0.0] })
     };
-    let verdict = |with, without, mean| table_of_masks(&[trial(with, mean), trial(without, mean)]);
+    let verdict = |with, without, mean| table_of_masks([&trial(with, mean), &trial(without, mean)]);
     assert_eq!(verdict(1.0, 1.0, 0.0).agreement, Agreement::Confirmed);
     // Noise with antialiasing alone: its masks are of whole pixels.
     let partly = verdict(1.21, 1.0, 0.0);

@@ -6,7 +6,9 @@ use crate::markdown_table;
 use crate::results::against::below;
 use crate::results::ratios::OnScenes;
 use crate::results::slab;
-use screendoor_study::study::comparison::{ComparedScene, Comparison, Duel, Outcome};
+use screendoor_study::study::comparison::{Comparison, Contender, Duel};
+use screendoor_study::study::publications::experiment::MeasuredScene;
+use screendoor_study::study::record::Record;
 
 /// Counts of the printed tables.
 const SHOWN: [u32; 3] = [4, 8, 16];
@@ -78,8 +80,8 @@ fn preamble(text: &mut String, c: &Comparison) {
     text.push('\n');
 }
 
-fn bytes(r: &Outcome) -> String {
-    if r.unbounded { "grows".to_string() } else { format!("{:.0}", r.state_bytes) }
+fn bytes(r: &Record) -> String {
+    r.state_bytes().map_or("grows".to_string(), |bytes| format!("{bytes:.0}"))
 }
 
 /// Smallest and largest of what differs from scene to scene.
@@ -98,16 +100,22 @@ fn range(values: impl Iterator<Item = String>) -> String {
 fn table(text: &mut String, c: &Comparison, count: u32) {
     let _ = writeln!(text, "### {count} samples or layers\n");
     let mut header = vec!["design", "state", "passes"];
-    header.extend(c.scenes.iter().map(|s| s.name));
-    let rows: Vec<Vec<String>> = (0..c.contenders.len())
-        .map(|i| {
-            let results = || c.scenes.iter().filter_map(|s| s.result(i, count));
+    header.extend(c.scenes.iter().map(|s| s.name.as_str()));
+    let rows: Vec<Vec<String>> = c
+        .contenders
+        .iter()
+        .map(|contender| {
+            let results = || c.scenes.iter().filter_map(|s| s.record(&contender.series, count));
             let mut row = vec![
-                format!("`{}`", c.contenders[i].label),
+                format!("`{}`", contender.label),
                 range(results().map(bytes)),
                 range(results().map(|r| r.passes.to_string())),
             ];
-            row.extend(c.scenes.iter().map(|s| s.result(i, count).map_or("—".into(), cell)));
+            row.extend(
+                c.scenes
+                    .iter()
+                    .map(|s| s.record(&contender.series, count).map_or("—".into(), cell)),
+            );
             row
         })
         .collect();
@@ -115,8 +123,8 @@ fn table(text: &mut String, c: &Comparison, count: u32) {
     text.push('\n');
 }
 
-fn cell(r: &Outcome) -> String {
-    let (rmse, mean) = (r.errors.rmse.value, r.errors.mean);
+fn cell(r: &Record) -> String {
+    let (rmse, mean) = (r.covered.rmse.value, r.covered.mean);
     let half = match mean.half_width() {
         0.0 => String::new(),
         half => format!(" ± {half:.2}"),
@@ -125,16 +133,16 @@ fn cell(r: &Outcome) -> String {
 }
 
 /// The ratio of two contenders' errors on every scene.
-fn ratios(c: &Comparison, a: usize, b: usize, count: u32) -> OnScenes {
-    let ratio = |s: &ComparedScene| {
-        let error = |i| s.result(i, count).map(|r| r.errors.rmse);
-        Some((s.name.to_string(), error(a)?.ratio(error(b)?)))
+fn ratios(c: &Comparison, a: &Contender, b: &Contender, count: u32) -> OnScenes {
+    let ratio = |s: &MeasuredScene| {
+        let error = |i: &Contender| s.record(&i.series, count).map(|r| r.covered.rmse);
+        Some((s.name.clone(), error(a)?.ratio(error(b)?)))
     };
     OnScenes(c.scenes.iter().filter_map(ratio).collect())
 }
 
 /// `lk` and `systematic` with each method, beside `enderton` with the same.
-fn pairs(c: &Comparison) -> Vec<(String, usize, usize)> {
+fn pairs(c: &Comparison) -> Vec<(String, &Contender, &Contender)> {
     let methods = ["", ":method=alpha-correction", ":method=depth", ":method=depth-correction"];
     let named = methods.into_iter().flat_map(|method| {
         ["lk", "systematic"]
@@ -160,7 +168,7 @@ pub(super) fn in_short(c: &Comparison) -> Vec<String> {
         });
         of.collect::<Vec<_>>().join("; ")
     };
-    let names: Vec<&str> = c.scenes.iter().map(|s| s.name).collect();
+    let names: Vec<&str> = c.scenes.iter().map(|s| s.name.as_str()).collect();
     let line = |design: &str| {
         format!(
             "**`{design}` in Enderton's methods** ({}; {} × {} pixels, {} seeds): RMSE at {SUMMED_UP} \
@@ -186,7 +194,7 @@ fn methods(text: &mut String, c: &Comparison) {
          where it is below 1 by more than its interval.\n",
         c.scenes.len()
     );
-    let row = |(name, a, b): (String, usize, usize)| {
+    let row = |(name, a, b): (String, &Contender, &Contender)| {
         let of = |count| ratios(c, a, b, count);
         let mut row = vec![format!("`{name}`")];
         row.extend(SHOWN.into_iter().chain([32]).map(|n| match of(n) {
@@ -212,11 +220,11 @@ const FORGETFUL: [&str; 2] = ["blend", "wboit"];
 /// Who has the least error within a budget of state.
 fn winners(text: &mut String, c: &Comparison) {
     let [.., most] = BUDGETS;
-    let forgets = |s: &&ComparedScene| {
+    let forgets = |s: &&MeasuredScene| {
         let winner = winner(c, s, most, false);
         FORGETFUL.iter().any(|name| winner.starts_with(&format!("`{name}`")))
     };
-    let forgetful: Vec<&str> = c.scenes.iter().filter(forgets).map(|s| s.name).collect();
+    let forgetful: Vec<&str> = c.scenes.iter().filter(forgets).map(|s| s.name.as_str()).collect();
     let _ = writeln!(
         text,
         "### Who wins within a budget\n\n\
@@ -246,20 +254,17 @@ fn winners(text: &mut String, c: &Comparison) {
     text.push('\n');
 }
 
-fn winner(c: &Comparison, scene: &ComparedScene, budget: f64, single: bool) -> String {
-    let fits = |r: &&Outcome| {
-        !r.unbounded
-            && r.state_bytes <= budget
+fn winner(c: &Comparison, scene: &MeasuredScene, budget: f64, single: bool) -> String {
+    let fits = |(contender, r): &(&Contender, &Record)| {
+        r.state_bytes().is_some_and(|bytes| bytes <= budget)
             && (!single || r.passes == 1)
-            && !c.contenders[r.contender].sorted_by_application
+            && !contender.sorted_by_application
     };
-    let best = scene
-        .results
-        .iter()
-        .filter(fits)
-        .min_by(|a, b| a.errors.rmse.value.total_cmp(&b.errors.rmse.value));
-    best.map_or("—".to_string(), |r| {
-        format!("`{}` {}: {:.1}", c.contenders[r.contender].label, r.count, r.errors.rmse.value)
+    let owned = scene.records.iter().filter_map(|r| Some((c.contender_of(r)?, r)));
+    let rmse = |r: &Record| r.covered.rmse.value;
+    let best = owned.filter(fits).min_by(|(_, a), (_, b)| rmse(a).total_cmp(&rmse(b)));
+    best.map_or("—".to_string(), |(contender, r)| {
+        format!("`{}` {}: {:.1}", contender.label, r.samples, rmse(r))
     })
 }
 
@@ -273,26 +278,23 @@ fn duels(text: &mut String, c: &Comparison) {
          sizes of either that lie within the range of both, errors between two counts \
          interpolated; within 2 % neither wins. — where the ranges do not meet.\n"
     );
-    let bounded: Vec<usize> = (0..c.contenders.len())
-        .filter(|i| {
-            c.scenes.iter().flat_map(|s| &s.results).any(|r| r.contender == *i && !r.unbounded)
-        })
-        .collect();
-    let numbers: Vec<String> = bounded.iter().map(|i| (i + 1).to_string()).collect();
+    let is_bounded = |contender: &Contender| {
+        let mut all = c.scenes.iter().flat_map(|s| &s.records);
+        all.any(|r| contender.owns(r) && !r.state_bits.unbounded)
+    };
+    let bounded: Vec<(usize, &Contender)> =
+        (1..).zip(&c.contenders).filter(|(_, contender)| is_bounded(contender)).collect();
+    let numbers: Vec<String> = bounded.iter().map(|(i, _)| i.to_string()).collect();
     let mut header = vec!["", "design", "won", "lost"];
     header.extend(numbers.iter().map(String::as_str));
     let rows: Vec<Vec<String>> = bounded
         .iter()
-        .map(|a| {
-            let duels: Vec<Duel> = bounded.iter().map(|b| c.duel(*a, *b)).collect();
+        .map(|(i, a)| {
+            let duels: Vec<Duel> = bounded.iter().map(|(_, b)| c.duel(a, b)).collect();
             let sum = |of: fn(&Duel) -> u32| duels.iter().map(of).sum::<u32>().to_string();
-            let mut row = vec![
-                (a + 1).to_string(),
-                format!("`{}`", c.contenders[*a].label),
-                sum(|d| d.won),
-                sum(|d| d.lost),
-            ];
-            row.extend(bounded.iter().zip(&duels).map(|(b, d)| match d {
+            let mut row =
+                vec![i.to_string(), format!("`{}`", a.label), sum(|d| d.won), sum(|d| d.lost)];
+            row.extend(bounded.iter().zip(&duels).map(|((_, b), d)| match d {
                 _ if a == b => String::new(),
                 Duel { won: 0, lost: 0, even: 0 } => "—".to_string(),
                 d => format!("{}:{}", d.won, d.lost),

@@ -10,9 +10,8 @@ use crate::results::claims::{RMSE, SAME, frames, ratios};
 use crate::results::ratios::{Holding, holding};
 use screendoor_study::metrics::Estimate;
 use screendoor_study::study::comparison::SLAB_LAYERS;
-use screendoor_study::study::publications::claims::{
-    DIAL, DISCRETE, ENDS, Trial, TriedScene, dialled,
-};
+use screendoor_study::study::publications::claims::{DIAL, DISCRETE, ENDS, Trial, dialled};
+use screendoor_study::study::publications::experiment::MeasuredScene;
 use screendoor_study::study::throughput::Spread;
 
 /// Errors below this, in 8-bit units, are rounding.
@@ -20,8 +19,8 @@ const ROUNDING: f64 = 0.01;
 
 /// Noise and bias of a variant in 8-bit units: the roots of the mean variance over seeds
 /// and of the pixels' mean squared mean errors.
-fn split(scene: &TriedScene, design: &str) -> Option<[f64; 2]> {
-    let e = &scene.variant(design)?.errors;
+fn split(scene: &MeasuredScene, design: &str) -> Option<[f64; 2]> {
+    let e = &scene.variant(design)?.covered;
     // A design without seeds has its whole error as bias.
     let variance = e.variance.unwrap_or(0.0);
     let bias = e.bias_squared.map_or(e.rmse.value * e.rmse.value, |b| b.value);
@@ -29,7 +28,7 @@ fn split(scene: &TriedScene, design: &str) -> Option<[f64; 2]> {
 }
 
 /// Noise and bias along the dial.
-fn along(scene: &TriedScene) -> Vec<[f64; 2]> {
+fn along(scene: &MeasuredScene) -> Vec<[f64; 2]> {
     DIAL.into_iter().filter_map(|bits| split(scene, &dialled(bits))).collect()
 }
 
@@ -51,14 +50,15 @@ struct Said {
 }
 
 fn said(trial: &Trial) -> Said {
-    let each = |of: &dyn Fn(&TriedScene) -> bool| {
-        holding(trial.scenes.iter().map(|scene| (scene.name, of(scene))))
+    let each = |of: &dyn Fn(&MeasuredScene) -> bool| {
+        holding(trial.scenes.iter().map(|scene| (scene.name.as_str(), of(scene))))
     };
     let [stochastic, kbuffer] = ENDS;
-    let same_error = |scene: &TriedScene| {
+    let same_error = |scene: &MeasuredScene| {
         let pair = scene.variant(&dialled(0)).zip(scene.variant(kbuffer));
         pair.is_some_and(|(a, b)| {
-            a.errors.rmse.value == b.errors.rmse.value && a.blocks.value == b.blocks.value
+            let blocks = [a, b].map(|v| v.blocks.map(|e| e.value));
+            a.covered.rmse.value == b.covered.rmse.value && blocks[0] == blocks[1]
         })
     };
     let ends = ratios(trial, RMSE, [DISCRETE, stochastic]);
@@ -119,10 +119,10 @@ const COLOURS: [&str; 4] = ["stochastic", "layered", "blended", "reference"];
 /// The dial as curves, one of each scene; none without results.
 pub(super) fn figures(trial: &Trial) -> Vec<(&'static str, Drawn)> {
     let scenes = trial.scenes.iter().zip(COLOURS.iter().cycle());
-    let styles = Styles::new(scenes.map(|(scene, colour)| (scene.name, *colour)));
+    let styles = Styles::new(scenes.map(|(scene, colour)| (scene.name.as_str(), *colour)));
     let curves = trial.scenes.iter().map(|scene| Curve {
-        series: scene.name.to_string(),
-        style: styles.of(scene.name),
+        series: scene.name.clone(),
+        style: styles.of(&scene.name),
         facts: None,
         marks: DIAL
             .iter()
@@ -179,17 +179,17 @@ pub(super) fn text(text: &mut String, trial: &Trial, folder: &str) {
     columns.insert(0, ("b = n, discrete".to_string(), DISCRETE.to_string()));
     columns.insert(0, ("stochastic".to_string(), ENDS[0].to_string()));
     columns.push(("k-buffer".to_string(), ENDS[1].to_string()));
-    let cell = |scene: &TriedScene, design: &str| {
+    let cell = |scene: &MeasuredScene, design: &str| {
         let parts = scene.variant(design).zip(split(scene, design));
         parts.map_or("—".to_string(), |(v, [noise, bias])| {
-            format!("{:.2} ({noise:.2}, {bias:.2})", v.errors.rmse.value)
+            format!("{:.2} ({noise:.2}, {bias:.2})", v.covered.rmse.value)
         })
     };
     let rows: Vec<Vec<String>> = trial
         .scenes
         .iter()
         .map(|scene| {
-            let mut row = vec![scene.name.to_string()];
+            let mut row = vec![scene.name.clone()];
             row.extend(columns.iter().map(|(_, design)| cell(scene, design)));
             row
         })
@@ -214,17 +214,18 @@ pub(super) fn text(text: &mut String, trial: &Trial, folder: &str) {
 mod tests {
     use super::*;
     use crate::results::claims::tests::variant;
+    use screendoor_study::study::analysis::made_up;
 
     /// A scene with noise and bias along the dial, its ends as given.
     fn scene(
         name: &'static str,
         of: impl Fn(usize) -> [f64; 2],
         [stochastic, kbuffer]: [f64; 2],
-    ) -> TriedScene {
+    ) -> MeasuredScene {
         let made = |design: &str, noise: f64, bias: f64| {
             let mut v = variant(design, noise.hypot(bias), 1.0, 0.0);
-            v.errors.variance = Some(noise * noise);
-            v.errors.bias_squared = Some(Estimate::of(&[bias * bias]));
+            v.covered.variance = Some(noise * noise);
+            v.covered.bias_squared = Some(Estimate::of(&[bias * bias]));
             v
         };
         let dial = DIAL.iter().enumerate().map(|(i, bits)| {
@@ -233,10 +234,10 @@ mod tests {
         });
         let ends = [made(DISCRETE, 9.0, 0.0), made(ENDS[0], stochastic, 0.0)];
         let variants = dial.chain(ends).chain([made(ENDS[1], 0.0, kbuffer)]).collect();
-        TriedScene { name, variants }
+        made_up::scene(name, variants)
     }
 
-    fn verdict(scenes: Vec<TriedScene>) -> Against {
+    fn verdict(scenes: Vec<MeasuredScene>) -> Against {
         against(&Trial { samples: 8, side: 64, seeds: 4, antialiased: false, scenes })
     }
 

@@ -35,10 +35,10 @@ pub(super) fn text(text: &mut String, p: &Publications) {
          largest deviation is {:.1} standard errors.\n",
         closely.side,
         closely.side,
-        closely.seeds,
+        closely.run.seeds,
         briefly.side,
         briefly.side,
-        briefly.seeds,
+        briefly.run.seeds,
         DESIGNS[0],
         found.lk.words(),
         found.lk_most,
@@ -49,16 +49,18 @@ pub(super) fn text(text: &mut String, p: &Publications) {
         .means
         .iter()
         .map(|m| {
-            let outside = m.mean.low > 0.0 || m.mean.high < 0.0;
+            let MeanError { scene, side, run } = m;
+            let mean = run.covered.mean;
+            let outside = mean.low > 0.0 || mean.high < 0.0;
             vec![
-                m.scene.to_string(),
-                format!("{} × {}", m.side, m.side),
-                format!("`{}`", m.design),
-                m.samples.to_string(),
-                format!("{:+.4} ± {:.4}", m.mean.value, m.mean.half_width()),
+                scene.clone(),
+                format!("{side} × {side}"),
+                format!("`{}`", run.design),
+                run.samples.to_string(),
+                format!("{:+.4} ± {:.4}", mean.value, mean.half_width()),
                 if outside { format!("{:.1} σ", deviation(m)) } else { "within".to_string() },
-                plain(m.rmse),
-                if m.unbiased { "unbiased" } else { "biased" }.to_string(),
+                plain(run.covered.rmse),
+                if run.kept().unbiased { "unbiased" } else { "biased" }.to_string(),
             ]
         })
         .collect();
@@ -74,7 +76,8 @@ pub(super) fn text(text: &mut String, p: &Publications) {
 
 /// How far a mean error lies from 0, in standard errors.
 fn deviation(m: &MeanError) -> f64 {
-    if m.mean.value == 0.0 { 0.0 } else { m.mean.standard_errors(m.seeds as usize) }
+    let (mean, seeds) = (m.run.covered.mean, m.run.seeds as usize);
+    if mean.value == 0.0 { 0.0 } else { mean.standard_errors(seeds) }
 }
 
 /// Where mean errors are within what chance allows.
@@ -89,18 +92,18 @@ impl Found {
     /// Of all mean errors, looked at together: 1 in 100 for the whole table.
     fn of(means: &[MeanError]) -> Self {
         let confidence = 1.0 - 0.01 / means.len().max(1) as f64;
-        let within = |m: &MeanError| deviation(m) <= student_t(confidence, m.seeds as usize);
+        let within = |m: &MeanError| deviation(m) <= student_t(confidence, m.run.seeds as usize);
         let on_scenes = |which: &dyn Fn(&MeanError) -> bool| {
             let chosen: Vec<&MeanError> = means.iter().filter(|m| which(m)).collect();
-            let mut scenes: Vec<&str> = chosen.iter().map(|m| m.scene).collect();
+            let mut scenes: Vec<&str> = chosen.iter().map(|m| m.scene.as_str()).collect();
             scenes.sort_unstable();
             scenes.dedup();
             let all = |scene: &str| chosen.iter().filter(|m| m.scene == scene).all(|m| within(m));
             let most = chosen.iter().map(|m| deviation(m)).fold(0.0, f64::max);
             (holding(scenes.into_iter().map(|scene| (scene, all(scene)))), most)
         };
-        let (lk, lk_most) = on_scenes(&|m| m.design == DESIGNS[0]);
-        let (unbiased, unbiased_most) = on_scenes(&|m| m.unbiased);
+        let (lk, lk_most) = on_scenes(&|m| m.run.design == DESIGNS[0]);
+        let (unbiased, unbiased_most) = on_scenes(&|m| m.run.kept().unbiased);
         Found { lk, lk_most, unbiased, unbiased_most }
     }
 }
@@ -109,20 +112,15 @@ impl Found {
 mod tests {
     use super::*;
     use screendoor_study::metrics::Estimate;
+    use screendoor_study::study::analysis::made_up;
+    use screendoor_study::study::record::Promise;
 
-    fn mean(scene: &'static str, design: &str, value: f64, unbiased: bool) -> MeanError {
-        let mean = Estimate { value, low: value - 0.1, high: value + 0.1 };
-        let (side, seeds, samples) = (64, 32, 8);
-        MeanError {
-            scene,
-            side,
-            seeds,
-            design: design.to_string(),
-            samples,
-            unbiased,
-            mean,
-            rmse: Estimate { value: 1.0, low: 0.9, high: 1.1 },
-        }
+    fn mean(scene: &str, design: &str, value: f64, unbiased: bool) -> MeanError {
+        let mut run = made_up::record(scene, design, 8, made_up::exactly(1.0));
+        run.covered.mean = Estimate { value, low: value - 0.1, high: value + 0.1 };
+        run.seeds = 32;
+        run.promises.unbiased = if unbiased { Promise::Always } else { Promise::Never };
+        MeanError { scene: scene.to_string(), side: 64, run }
     }
 
     #[test]

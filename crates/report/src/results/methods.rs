@@ -112,7 +112,7 @@ fn orders(count: usize) -> String {
 }
 
 fn rmse(f: &Figure8, design: &str) -> Option<Estimate> {
-    f.rmse.iter().find(|(name, _)| *name == design).map(|(_, e)| *e)
+    f.scene.variant(design).map(|r| r.covered.rmse)
 }
 
 /// The samples of figure 8.
@@ -163,7 +163,7 @@ pub(super) fn figure_8_against(m: &Methods) -> Against {
 
 fn figure_8(text: &mut String, m: &Methods) {
     let f = &m.figure_8;
-    let s = &f.statistics;
+    let s = &f.scene.statistics;
     figure_8_against(m).open(text);
     let _ = writeln!(
         text,
@@ -176,11 +176,13 @@ fn figure_8(text: &mut String, m: &Methods) {
         s.depth_complexity.p95
     );
     let rows: Vec<Vec<String>> = f
-        .rmse
+        .scene
+        .records
         .iter()
-        .map(|(name, e)| {
-            let of = |other| rmse(f, other).map_or("—".to_string(), |o| ratio(*e, o));
-            vec![format!("`{name}`"), plain(*e), of("enderton"), of("enderton:mask=naive")]
+        .map(|r| {
+            let e = r.covered.rmse;
+            let of = |other| rmse(f, other).map_or("—".to_string(), |o| ratio(e, o));
+            vec![format!("`{}`", r.series), plain(e), of("enderton"), of("enderton:mask=naive")]
         })
         .collect();
     text.push_str(&markdown_table(&["design", "RMSE", "÷ enderton", "÷ naive"], &rows));

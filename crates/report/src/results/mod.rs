@@ -227,6 +227,7 @@ fn ratio(a: Estimate, b: Estimate) -> String {
 mod tests {
     use super::*;
     use crate::html::verification::{sections, summary};
+    use screendoor_study::study::publications::experiment::Quiet;
     use screendoor_study::study::publications::{Effort, measure_publication};
 
     #[test]
@@ -252,9 +253,9 @@ mod tests {
     #[test]
     fn every_claim_has_its_section_and_every_picture_is_there() {
         let effort = Effort { seeds: 2, side: 64, comparison_side: 32, ..Effort::brief() };
-        let mut named = Vec::new();
+        let (mut named, quiet) = (Vec::new(), Quiet::new());
         for part in [Publication::LaineKarras, Publication::Methods, Publication::Slab] {
-            let measured = measure_publication(part, None, effort, |_, _, _| ()).unwrap();
+            let measured = measure_publication(part, &quiet.lab(), effort).unwrap();
             assert_eq!((measured.publication(), measured.missing().len()), (part, 0));
             let document = document(&measured, "verification");
             let table = summary(&document.against).body.0;

@@ -6,8 +6,10 @@ use crate::markdown_table;
 use crate::results::against::{Against, Agreement};
 use crate::results::dial;
 use screendoor_study::study::comparison::{
-    ComparedScene, Comparison, Outcome, SLAB_CLAIM, SLAB_LAYERS, SLAB_LIMIT, SLAB_RIVALS,
+    Comparison, Contender, SLAB_CLAIM, SLAB_LAYERS, SLAB_LIMIT, SLAB_RIVALS,
 };
+use screendoor_study::study::publications::experiment::MeasuredScene;
+use screendoor_study::study::record::Record;
 
 /// Samples of stochastic transparency that SLAB is claimed to be better than.
 const CLAIMED: u32 = 32;
@@ -17,15 +19,16 @@ struct Duel<'a> {
     antialiased: bool,
     slab: &'static str,
     rival: &'static str,
-    scenes: &'a [ComparedScene],
-    places: [usize; 2],
+    scenes: &'a [MeasuredScene],
+    places: [&'a Contender; 2],
 }
 
 impl Duel<'_> {
     /// On how many scenes SLAB has the smaller error than its rival at `count` samples.
     fn won(&self, count: u32) -> usize {
-        let better = |s: &&ComparedScene| {
-            let error = |i: usize, n| s.result(self.places[i], n).map(|r| r.errors.rmse.value);
+        let better = |s: &&MeasuredScene| {
+            let error =
+                |i: usize, n| s.record(&self.places[i].series, n).map(|r| r.covered.rmse.value);
             error(0, SLAB_LAYERS).zip(error(1, count)).is_some_and(|(slab, rival)| slab < rival)
         };
         self.scenes.iter().filter(better).count()
@@ -34,7 +37,7 @@ impl Duel<'_> {
     /// SLAB's bytes of state ÷ its rival's with as many samples as SLAB has layers.
     fn state(&self) -> Option<f64> {
         let scene = self.scenes.first()?;
-        let bytes = |i: usize| scene.result(self.places[i], SLAB_LAYERS).map(|r| r.state_bytes);
+        let bytes = |i: usize| scene.record(&self.places[i].series, SLAB_LAYERS)?.state_bytes();
         Some(bytes(0)? / bytes(1)?)
     }
 
@@ -170,9 +173,9 @@ fn errors(text: &mut String, c: &Comparison) {
         .iter()
         .map(|scene| {
             let layers = scene.statistics.depth_complexity.mean;
-            let mut row = vec![scene.name.to_string(), format!("{layers:.1}")];
+            let mut row = vec![scene.name.clone(), format!("{layers:.1}")];
             row.extend(columns.iter().map(|(label, count)| {
-                let found = c.contender(label).and_then(|i| scene.result(i, *count));
+                let found = c.contender(label).and_then(|i| scene.record(&i.series, *count));
                 found.map_or("—".to_string(), cell)
             }));
             row
@@ -186,9 +189,10 @@ fn errors(text: &mut String, c: &Comparison) {
 }
 
 /// An error with its interval, where there is one, and the state.
-fn cell(r: &Outcome) -> String {
-    let e = r.errors.rmse;
+fn cell(r: &Record) -> String {
+    let e = r.covered.rmse;
     let interval =
         if e.low == e.high { String::new() } else { format!(" ± {:.2}", e.half_width()) };
-    format!("{:.2}{interval} ({:.0})", e.value, r.state_bytes)
+    let bytes = r.state_bytes().unwrap_or(f64::INFINITY);
+    format!("{:.2}{interval} ({bytes:.0})", e.value)
 }

@@ -7,8 +7,8 @@ use crate::results::against::{Against, Agreement, above, below};
 use crate::results::ratios::OnScenes;
 use crate::results::{plain, ratio};
 use screendoor_study::metrics::Estimate;
-use screendoor_study::study::Run;
 use screendoor_study::study::publications::{COUNTS, DESIGNS, Publications, Published, Table1};
+use screendoor_study::study::record::Record;
 
 /// The table beside the paper's.
 pub(super) fn against(p: &Publications) -> Against {
@@ -27,7 +27,7 @@ pub(super) fn against(p: &Publications) -> Against {
             let ((_, e, naive), (_, last_e, last_naive)) = (ratios.first()?, ratios.last()?);
             Some(format!(
                 "on `{}` {:.2} to {:.2} against `enderton`, {:.2} to {:.2} against `naive`",
-                table.name, e.value, last_e.value, naive.value, last_naive.value
+                table.scene.name, e.value, last_e.value, naive.value, last_naive.value
             ))
         })
         .collect();
@@ -68,7 +68,7 @@ const NEAR: f64 = 0.1;
 /// At each count the published ratio, `lk` ÷ `enderton` and `lk` ÷ `naive`.
 fn ratios(table: &Table1) -> Vec<(f64, Estimate, Estimate)> {
     let at = |(n, [paper_lk, paper_other]): (&u32, [f64; 2])| {
-        let [lk, e, naive] = runs(table, *n).map(|r| r.rmse_fine);
+        let [lk, e, naive] = runs(table, *n).map(|r| r.fine);
         (paper_lk / paper_other, lk.ratio(e), lk.ratio(naive))
     };
     COUNTS.iter().zip(table.stands_for.rmse()).map(at).collect()
@@ -83,7 +83,7 @@ const MANY: u32 = 64;
 fn few_to_many(p: &Publications, other: usize) -> OnScenes {
     let scenes = p.table_1.iter().map(|table| {
         let (few, many) = (runs(table, FEW)[0], runs(table, MANY)[other]);
-        (table.name.to_string(), few.rmse_fine.ratio(many.rmse_fine))
+        (table.scene.name.to_string(), few.fine.ratio(many.fine))
     });
     OnScenes(scenes.collect())
 }
@@ -140,10 +140,10 @@ pub(super) fn fewer_samples_text(text: &mut String, p: &Publications) {
         p.effort.side, p.effort.side, p.effort.seeds
     );
     let row = |table: &Table1| {
-        let lk = runs(table, FEW)[0].rmse_fine;
-        let [_, e, naive] = runs(table, MANY).map(|r| r.rmse_fine);
+        let lk = runs(table, FEW)[0].fine;
+        let [_, e, naive] = runs(table, MANY).map(|r| r.fine);
         vec![
-            table.name.to_string(),
+            table.scene.name.to_string(),
             plain(lk),
             plain(e),
             plain(naive),
@@ -186,7 +186,7 @@ pub(super) fn text(text: &mut String, p: &Publications) {
 }
 
 fn table_1(text: &mut String, index: usize, table: &Table1) {
-    let s = &table.statistics;
+    let s = &table.scene.statistics;
     let paper = match table.stands_for {
         Published::Motor => "MOTOR",
         Published::Cloth => "CLOTH",
@@ -195,7 +195,7 @@ fn table_1(text: &mut String, index: usize, table: &Table1) {
         text,
         "### `{}`, beside {paper}\n\n{}. {:.2} million fragments, {:.1} per covered pixel (95 % of them have \
          at most {}), an edge in {:.0} % of the covered pixels.\n",
-        table.name,
+        table.scene.name,
         table.origin,
         s.fragments as f64 / 1e6,
         s.depth_complexity.mean,
@@ -206,7 +206,7 @@ fn table_1(text: &mut String, index: usize, table: &Table1) {
         .iter()
         .zip(table.stands_for.rmse())
         .map(|(n, [paper_lk, paper_e])| {
-            let [lk, e, naive] = runs(table, *n).map(|r| r.rmse_fine);
+            let [lk, e, naive] = runs(table, *n).map(|r| r.fine);
             vec![
                 n.to_string(),
                 plain(lk),
@@ -283,14 +283,14 @@ fn table_1(text: &mut String, index: usize, table: &Table1) {
 const LEAST_PIXELS: u64 = 1000;
 
 /// The runs of [`DESIGNS`] at a sample count.
-pub(super) fn runs(table: &Table1, samples: u32) -> [&Run; 3] {
+pub(super) fn runs(table: &Table1, samples: u32) -> [&Record; 3] {
     DESIGNS.map(|design| {
-        let found = table.runs.iter().find(|r| r.design == design && r.samples == samples);
+        let found = table.scene.record(design, samples);
         found.expect("every design was run at every count")
     })
 }
 
-fn plain_srgb(r: &Run) -> String {
+fn plain_srgb(r: &Record) -> String {
     format!("{:.2}", r.covered.rmse_srgb.value)
 }
 

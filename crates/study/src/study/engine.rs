@@ -84,6 +84,9 @@ pub enum Engine {
     Gpu(Box<Gpu>, Threads),
 }
 
+/// This machine's processor, as fast as it can.
+pub const FAST: &Engine = &Engine::Cpu(Which::Fast);
+
 /// What a GPU says of a replay.
 #[derive(Clone, Debug, Serialize)]
 pub struct OnGpu {

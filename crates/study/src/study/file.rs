@@ -7,7 +7,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::study::engine::EngineName;
 use screendoor_designs::{Configured, configure};
-use screendoor_rop::ReplayOptions;
 use screendoor_scene::capture::{
     CameraOptions, CaptureOptions, Faces, Order, PatternKind, pattern,
 };
@@ -22,6 +21,7 @@ screendoor_trace::options! {
         FlipHdr = "flip-hdr": "FLIP over all exposures in which something shows",
         Spectrum = "spectrum": "the error's radially averaged power spectrum",
         Filtered = "filtered": "RMSE after a Gaussian of 1 and of 2 pixels",
+        Blocks = "blocks": "RMSE over the frame after averaging over blocks of 4 by 4 pixels",
     }
 }
 
@@ -153,7 +153,7 @@ pub struct SceneEntry {
 
 /// What a study file need not say.
 mod defaults {
-    use super::{EngineName, Faces, Metric, Options, Order, PatternKind};
+    use super::{EngineName, Faces, Metric, Order, PatternKind};
     use screendoor_rop::Which;
 
     /// Samples per pixel of the pictures that are kept, where there are so many.
@@ -169,7 +169,7 @@ mod defaults {
         3
     }
     pub fn metrics() -> Vec<Metric> {
-        Metric::ALL.to_vec()
+        vec![Metric::Flip, Metric::FlipHdr, Metric::Spectrum, Metric::Filtered]
     }
     pub fn memory() -> u64 {
         512
@@ -237,21 +237,11 @@ impl Study {
         configure(&spec, &[])
     }
 
-    /// How its traces are replayed.
-    pub fn replay_options(&self) -> ReplayOptions<'static> {
-        ReplayOptions { memory: self.memory << 20, ..ReplayOptions::default() }
-    }
-
     /// The publications to measure: each once, and none that is part of another.
     pub fn publications_to_measure(&self) -> Vec<Publication> {
         let asked = |p: &Publication| self.publications.contains(p);
         let covered = |p: Publication| self.publications.iter().any(|o| p.is_part_of(*o));
         Publication::ALL.iter().copied().filter(|p| asked(p) && !covered(*p)).collect()
-    }
-
-    /// Whether a metric is asked for.
-    pub fn takes(&self, metric: Metric) -> bool {
-        self.metrics.contains(&metric)
     }
 
     /// What is left out and whose usual value would contradict what is given has another.

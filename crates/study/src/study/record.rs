@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use serde::{Deserialize, Serialize};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::metrics::{EnsembleErrors, Estimate};
 use crate::study::throughput::Spread;
@@ -11,6 +12,37 @@ use screendoor_rop::{EventCounts, Promises, StateBits};
 /// Part of a record, for those who read records alone.
 pub use screendoor_rop::Promise;
 
+/// The version of the form of [`Record`] that this program writes. It rises where what an
+/// older program would read means something else; a field that older records lack has a
+/// default instead.
+pub const VERSION: u32 = 1;
+
+/// The version of records that name none.
+fn first() -> u32 {
+    1
+}
+
+fn is_first(version: &u32) -> bool {
+    *version == first()
+}
+
+fn known<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
+    let version = u32::deserialize(deserializer)?;
+    check_version(version.into()).map_err(D::Error::custom)?;
+    Ok(version)
+}
+
+/// Refuses a version that this program does not know.
+pub(in crate::study) fn check_version(version: u64) -> Result<(), String> {
+    if version <= u64::from(VERSION) {
+        return Ok(());
+    }
+    Err(format!(
+        "it is a record of version {version}, and this screendoor reads up to version {VERSION}: a \
+         later screendoor wrote it"
+    ))
+}
+
 /// One design at one sample count on one scene, over all seeds of the study.
 ///
 /// Everything but [`Record::speed`] is a pure function of the study: measured again, on
@@ -18,6 +50,10 @@ pub use screendoor_rop::Promise;
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Record {
+    /// Of the form that this is, [`VERSION`]. Not written where it is 1: the form has begun
+    /// without.
+    #[serde(default = "first", skip_serializing_if = "is_first", deserialize_with = "known")]
+    pub version: u32,
     /// Names the run within its study: a file name on every system.
     pub id: String,
     /// The scene's name in the study.
@@ -54,6 +90,7 @@ pub struct Record {
     pub fine: Estimate,
     /// RMSE over the covered pixels after a Gaussian on the error, in 8-bit units: what is
     /// left of it from afar. Empty where it was not asked for.
+    #[serde(default)]
     pub filtered: Vec<Filtered>,
     /// FLIP of the pictures as a display of standard range shows them.
     pub flip: Option<FlipOverSeeds>,
@@ -61,6 +98,10 @@ pub struct Record {
     pub flip_hdr: Option<FlipOverSeeds>,
     /// The error's spectrum, mean over seeds.
     pub spectrum: Option<SpectrumOverSeeds>,
+    /// RMSE over the frame after picture and exact picture are averaged over blocks of
+    /// [`BLOCK`](crate::study::measure::BLOCK) × `BLOCK` pixels, in 8-bit units.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub blocks: Option<Estimate>,
     /// What the design did with the first seed.
     pub events: EventCounts,
     /// State per pixel.
@@ -179,7 +220,7 @@ pub struct SpectrumOverSeeds {
 }
 
 /// How fast an engine replays a trace.
-#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Speed {
     /// Seconds from the file to the picture; `None` where the engine cannot do it.

@@ -4,7 +4,10 @@ use std::collections::BTreeMap;
 
 use crate::metrics::{EnsembleErrors, Estimate, Temporal};
 use crate::study::file::{SceneEntry, Study};
-use crate::study::record::{Filtered, FlipOverSeeds, Promised, Record, SpectrumOverSeeds, Speed};
+use crate::study::publications::experiment::MeasuredScene;
+use crate::study::record::{
+    Filtered, FlipOverSeeds, Promised, Record, SpectrumOverSeeds, Speed, VERSION,
+};
 use crate::study::results::{Machine, Missing, Results, SceneFacts};
 use crate::study::throughput::Spread;
 use screendoor_rop::{EventCounts, Promise, StateBits};
@@ -106,6 +109,11 @@ fn facts(name: &str, place: usize) -> SceneFacts {
     }
 }
 
+/// A scene of an experiment with records.
+pub fn scene(name: &str, records: Vec<Record>) -> MeasuredScene {
+    MeasuredScene { name: name.to_string(), statistics: facts(name, 0).statistics, records }
+}
+
 /// A record with an error and nothing else of note.
 pub fn record(scene: &str, series: &str, samples: u32, rmse: Estimate) -> Record {
     let design = series.replace("{n}", &samples.to_string());
@@ -121,6 +129,7 @@ pub fn record(scene: &str, series: &str, samples: u32, rmse: Estimate) -> Record
         temporal: None,
     };
     Record {
+        version: VERSION,
         id: format!("{scene}-{}-{samples}", design.replace([':', '=', ','], "_")),
         scene: scene.into(),
         trace: "0".into(),
@@ -144,6 +153,7 @@ pub fn record(scene: &str, series: &str, samples: u32, rmse: Estimate) -> Record
         edges: errors,
         fine: rmse.scaled(1.3),
         filtered: vec![],
+        blocks: None,
         flip: None,
         flip_hdr: None,
         spectrum: None,

@@ -1,79 +1,45 @@
-//! Who is compared: every design, and what Wyman's claim is about.
+//! Who is compared: the designs of the study file, and what Wyman's claim is about.
 
 use serde::Serialize;
 
-use screendoor_designs::{Configured, DESIGNS, Entry, REFERENCE, configure};
-use screendoor_rop::Family;
+use crate::study::record::Record;
+use screendoor_designs::{DESIGNS, configure};
 use screendoor_trace::error::Result;
-use screendoor_trace::param::Kind;
 
 /// A design in the comparison: its settings for any count.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct Contender {
     /// Name and settings without the count.
     pub label: String,
-    /// Its family.
-    pub family: Family,
-    /// Whether the count is one of layers too.
-    pub layered: bool,
-    /// The design's name.
-    name: &'static str,
-    settings: Vec<(String, String)>,
-    /// Parameters that follow the count, as (name, times the count).
-    counted: Vec<(&'static str, u32)>,
+    /// The design as the study has it.
+    pub series: String,
     /// Whether the application must sort for it.
     pub sorted_by_application: bool,
 }
 
-/// Parameters whose every value makes a contender of its own: they name methods.
-const METHODS: [&str; 4] = ["method", "normalise", "moments", "opacity"];
-
-/// The contenders: every design of the registry with its defaults, and with each of
-/// its methods.
-pub fn contenders() -> Vec<Contender> {
-    let mut list = Vec::new();
-    for entry in DESIGNS.iter().filter(|e| e.info.name != REFERENCE) {
-        list.push(Contender::of(entry, &[]));
-        for param in entry.info.params.iter().filter(|p| METHODS.contains(&p.name)) {
-            let Kind::Choice { options } = param.kind else { continue };
-            for option in options.iter().filter(|o| o.name != param.default) {
-                list.push(Contender::of(entry, &[(param.name, option.name)]));
-            }
-        }
-        if entry.info.params.iter().any(|p| p.name == "mask") {
-            list.push(Contender::of(entry, &[("mask", "naive")]));
-        }
-    }
-    list
-}
-
 impl Contender {
-    fn of(entry: &Entry, settings: &[(&str, &str)]) -> Self {
-        let has = |name: &str| entry.info.params.iter().any(|p| p.name == name);
-        let settings: Vec<(String, String)> =
-            settings.iter().map(|(k, v)| (k.to_string(), v.to_string())).collect();
-        // Wyman's figure 1: twice as many coverage bits as layers.
-        let counted: Vec<(&str, u32)> =
-            [("layers", 1), ("bits", 2)].into_iter().filter(|(name, _)| has(name)).collect();
-        let shown: Vec<String> = settings.iter().map(|(k, v)| format!("{k}={v}")).collect();
-        let separator = if shown.is_empty() { "" } else { ":" };
-        Contender {
-            label: format!("{}{separator}{}", entry.info.name, shown.join(",")),
-            family: entry.info.family,
-            layered: counted.iter().any(|(name, _)| *name == "layers"),
-            name: entry.info.name,
-            settings,
-            counted,
-            sorted_by_application: entry.asks_for_primitive_depths(),
-        }
+    /// The contender of a study's design: what follows the count is no part of its label.
+    ///
+    /// # Errors
+    /// As [`configure`].
+    pub(super) fn of(series: &str) -> Result<Self> {
+        let (name, settings) = series.split_once(':').unwrap_or((series, ""));
+        let own = settings.split(',').filter(|s| !s.is_empty() && !s.contains('{'));
+        let own = own.collect::<Vec<_>>().join(",");
+        let separator = if own.is_empty() { "" } else { ":" };
+        let label = format!("{name}{separator}{own}");
+        let name = configure(&label, &[])?.info().name;
+        let entry = DESIGNS.iter().find(|entry| entry.info.name == name);
+        Ok(Contender {
+            sorted_by_application: entry.is_some_and(|e| e.asks_for_primitive_depths()),
+            series: series.to_string(),
+            label,
+        })
     }
 
-    /// The design for `count` samples or layers.
-    pub(super) fn at(&self, count: u32) -> Result<Configured> {
-        let mut settings = self.settings.clone();
-        let counted = |(name, times): &(&str, u32)| (name.to_string(), (times * count).to_string());
-        settings.extend(self.counted.iter().map(counted));
-        configure(self.name, &settings)
+    /// Whether a record is its.
+    pub fn owns(&self, record: &Record) -> bool {
+        record.series == self.series
     }
 }
 
@@ -93,45 +59,77 @@ pub const SLAB_RIVALS: [u32; 3] = [8, 16, 32];
 /// What `slab` becomes with ever more bits.
 pub const SLAB_LIMIT: &str = "kbuffer";
 
-/// Whether Wyman's claim is about a contender at a count.
-pub(super) fn claimed(contender: &Contender, count: u32) -> bool {
-    let label = contender.label.as_str();
-    let layered = label == SLAB_LIMIT || SLAB_CLAIM.iter().any(|[slab, _]| *slab == label);
-    let rival = SLAB_CLAIM.iter().any(|[_, rival]| *rival == label);
-    layered && count == SLAB_LAYERS || rival && SLAB_RIVALS.contains(&count)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::comparison::COUNTS;
+    use crate::study::comparison::{COUNTS, slab};
+    use crate::study::file::Study;
+    use crate::study::publications::experiment::{parse, studies};
+    use screendoor_designs::{Entry, REFERENCE};
+    use screendoor_trace::param::Kind;
 
-    #[test]
-    fn the_claim_is_about_contenders_that_there_are() {
-        let list = contenders();
-        let counts = |label: &str| {
-            let found = list.iter().find(|c| c.label == label).expect(label);
-            COUNTS.into_iter().filter(|n| claimed(found, *n)).collect::<Vec<_>>()
-        };
-        for [slab, rival] in SLAB_CLAIM {
-            assert_eq!(counts(slab), [SLAB_LAYERS]);
-            assert_eq!(counts(rival), SLAB_RIVALS);
+    /// Parameters whose every value makes a contender of its own: they name methods.
+    const METHODS: [&str; 4] = ["method", "normalise", "moments", "opacity"];
+
+    /// A design of the registry with settings, and what follows the count.
+    fn series(entry: &Entry, settings: &[(&str, &str)]) -> String {
+        let has = |name: &str| entry.info.params.iter().any(|p| p.name == name);
+        // Wyman's figure 1: twice as many coverage bits as layers.
+        let counted =
+            [("layers", "{n}"), ("bits", "{2n}")].into_iter().filter(|(name, _)| has(name));
+        let all = settings.iter().copied().chain(counted);
+        let list: Vec<String> = all.map(|(name, value)| format!("{name}={value}")).collect();
+        let separator = if list.is_empty() { "" } else { ":" };
+        format!("{}{separator}{}", entry.info.name, list.join(","))
+    }
+
+    /// Every design of the registry with its defaults, and with each of its methods.
+    fn of_the_registry() -> Vec<String> {
+        let mut list = Vec::new();
+        for entry in DESIGNS.iter().filter(|e| e.info.name != REFERENCE) {
+            list.push(series(entry, &[]));
+            for param in entry.info.params.iter().filter(|p| METHODS.contains(&p.name)) {
+                let Kind::Choice { options } = param.kind else { continue };
+                let others = options.iter().filter(|o| o.name != param.default);
+                list.extend(others.map(|o| series(entry, &[(param.name, o.name)])));
+            }
+            if entry.info.params.iter().any(|p| p.name == "mask") {
+                list.push(series(entry, &[("mask", "naive")]));
+            }
         }
-        assert_eq!(counts(SLAB_LIMIT), [SLAB_LAYERS]);
-        assert!(counts("mlab").is_empty());
+        list
     }
 
     #[test]
-    fn every_design_is_a_contender_and_all_settings_resolve() {
-        let list = contenders();
-        for entry in DESIGNS.iter().filter(|e| e.info.name != REFERENCE) {
-            assert!(list.iter().any(|c| c.label == entry.info.name));
+    fn the_study_file_compares_every_design_of_the_registry_at_every_count() {
+        let study = parse(studies::COMPARISON).unwrap();
+        assert_eq!(study.designs, of_the_registry(), "write them into comparison.toml");
+        assert_eq!(study.samples, COUNTS);
+    }
+
+    #[test]
+    fn the_claim_is_about_contenders_that_there_are() {
+        let [of_slab, rivals] = slab().unwrap();
+        let labels = |study: &Study| -> Vec<String> {
+            study.designs.iter().map(|d| Contender::of(d).unwrap().label).collect()
+        };
+        let (slabs, rival_labels) = (labels(&of_slab), labels(&rivals));
+        for [slab, rival] in SLAB_CLAIM {
+            assert!(slabs.iter().any(|l| l == slab) && rival_labels.iter().any(|l| l == rival));
         }
-        for contender in &list {
-            for count in COUNTS {
-                contender.at(count).unwrap();
-            }
-        }
-        assert!(list.len() > DESIGNS.len());
+        assert!(slabs.iter().any(|l| l == SLAB_LIMIT));
+        assert_eq!((of_slab.samples, rivals.samples), (vec![SLAB_LAYERS], SLAB_RIVALS.to_vec()));
+        // What is measured for both is one contender.
+        let all = parse(studies::COMPARISON).unwrap().designs;
+        assert!(of_slab.designs.iter().chain(&rivals.designs).all(|d| all.contains(d)));
+    }
+
+    #[test]
+    fn what_follows_the_count_is_no_part_of_a_label() {
+        let of = |series: &str| Contender::of(series).unwrap();
+        assert_eq!(of("slab:opacity=discrete,layers={n},bits={2n}").label, "slab:opacity=discrete");
+        assert_eq!(of("kbuffer:layers={n}").label, "kbuffer");
+        assert!(of("sorted-blend").sorted_by_application && !of("blend").sorted_by_application);
+        assert!(Contender::of("nothing").is_err());
     }
 }

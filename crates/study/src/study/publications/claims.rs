@@ -2,18 +2,14 @@
 //! is: Enderton's table of masks, dithered and stratified rounds, LK's rounds of hashing,
 //! and Wyman's dial from noise to bias.
 
-use std::path::Path;
-
 use serde::Serialize;
 
-use crate::metrics::{Ensemble, EnsembleErrors, Estimate, PixelClasses, Region};
-use crate::study::comparison::{SLAB_LAYERS, SceneSpec};
-use crate::study::publications::figures::averaged;
-use crate::study::publications::{Effort, replay};
+use crate::study::comparison::SLAB_LAYERS;
+use crate::study::file::{SceneEntry, Study};
+use crate::study::publications::Effort;
+use crate::study::publications::experiment::{Found, Frames, Lab, MeasuredScene, parse, studies};
 use screendoor_scene::capture::PatternKind;
 use screendoor_trace::error::Result;
-use screendoor_trace::tile::TileGrid;
-use screendoor_trace::trace::Trace;
 
 /// Variants of a method on several scenes, at one sample count.
 #[derive(Clone, Debug, Serialize)]
@@ -22,57 +18,40 @@ pub struct Trial {
     pub samples: u32,
     /// Frame side in pixels.
     pub side: u32,
-    /// Seeds of each variant.
+    /// Seeds of each variant that has any.
     pub seeds: u32,
     /// Whether samples lie where an antialiased picture has them, and not all at the
     /// pixel's centre.
     pub antialiased: bool,
     /// Scene after scene.
-    pub scenes: Vec<TriedScene>,
+    pub scenes: Vec<MeasuredScene>,
 }
 
-/// One scene of a trial.
-#[derive(Clone, Debug, Serialize)]
-pub struct TriedScene {
-    /// Its name; a built-in scene's begins with `builtin:`.
-    pub name: &'static str,
-    /// Variant after variant.
-    pub variants: Vec<Variant>,
-}
-
-/// A variant on a scene.
-#[derive(Clone, Debug, Serialize)]
-pub struct Variant {
-    /// The design with its parameters.
-    pub design: String,
-    /// Errors over the covered pixels against the exact picture of the same samples.
-    pub errors: EnsembleErrors,
-    /// RMSE over the frame after both pictures are averaged over blocks of
-    /// [`BLOCK`] × [`BLOCK`] pixels, in 8-bit units.
-    pub blocks: Estimate,
-}
-
-impl TriedScene {
-    /// A variant's figures.
-    pub fn variant(&self, design: &str) -> Option<&Variant> {
-        self.variants.iter().find(|v| v.design == design)
+impl Trial {
+    /// What an experiment says at one sample count.
+    fn of(found: &Found) -> Self {
+        let study = &found.results.study;
+        let first = study.scenes.first();
+        Trial {
+            samples: study.samples.first().copied().unwrap_or_default(),
+            side: first.map_or(0, |scene| scene.size[0]),
+            seeds: study.seeds,
+            antialiased: first.is_some_and(|scene| scene.pattern != PatternKind::Centre),
+            scenes: found.scenes(SceneEntry::title),
+        }
     }
 }
-
-/// Side of the blocks of [`Variant::blocks`].
-pub const BLOCK: u32 = 4;
 
 /// What is said of Enderton's and LK's samples.
 #[derive(Clone, Debug, Serialize)]
 pub struct Claims {
-    /// Masks of a finite table, with antialiasing and without ([`TABLE`]).
-    pub table: [Trial; 2],
-    /// Dithered numbers of samples ([`DITHERED`]).
-    pub dither: Trial,
+    /// Masks of a finite table ([`TABLE`]), dithered numbers of samples ([`DITHERED`]) and
+    /// rounds of figure 4's hash ([`HASH_ROUNDS`]).
+    pub variants: Trial,
+    /// Masks of a finite table without antialiasing.
+    pub masks: Trial,
     /// Rounds stratified together ([`STRATIFIED`]).
     pub rounds: Trial,
-    /// Rounds of figure 4's hash ([`HASH_ROUNDS`]).
-    pub hash_rounds: Trial,
 }
 
 /// Masks as published by Enderton et al. (sections 3.1 and 5): computed, and from a table;
@@ -116,20 +95,6 @@ pub fn dialled(bits: u32) -> String {
     format!("slab:layers={SLAB_LAYERS},bits={bits},normalise=none")
 }
 
-/// A scene's trace, by its name.
-type Named = (&'static str, Trace);
-
-/// Every scene that there is, in frames of `side` pixels.
-fn scenes(models: Option<&Path>, side: u32, pattern: PatternKind) -> Result<Vec<Named>> {
-    let mut list = Vec::new();
-    for spec in SceneSpec::all(models) {
-        if let Some(trace) = spec.capture(models, side, pattern)? {
-            list.push((spec.label(), trace));
-        }
-    }
-    Ok(list)
-}
-
 impl Effort {
     /// Frame side in pixels of the claims, which all scenes are tried for.
     pub fn claims_side(&self) -> u32 {
@@ -137,109 +102,61 @@ impl Effort {
     }
 }
 
-/// Tries all that [`Claims`] holds on every scene that there is. `progress` is told what
-/// runs.
+/// Tries all that [`Claims`] holds on every scene that there is.
 ///
 /// # Errors
-/// As [`screendoor_scene::scene::load`] and [`screendoor_designs::Configured::replay`].
-pub(super) fn claims(
-    models: Option<&Path>,
-    effort: Effort,
-    mut progress: impl FnMut(&str),
-) -> Result<Claims> {
-    let side = effort.claims_side();
-    progress("scenes of the claims");
-    let scenes_of = |pattern| scenes(models, side, pattern);
-    let (antialiased, centred) = (scenes_of(PatternKind::Auto)?, scenes_of(PatternKind::Centre)?);
-    let mut tried = |what: &str, scenes: &[Named], designs: &[&str], samples| {
-        progress(what);
-        trial(scenes, designs, samples, effort.seeds, std::ptr::eq(scenes, &*antialiased))
-    };
-    let rounds: Vec<&str> = STRATIFIED.into_iter().flatten().collect();
+/// As [`Lab`] measures.
+pub(super) fn claims(lab: &Lab<'_>, effort: Effort) -> Result<Claims> {
+    let frames = Frames::new(effort.claims_side(), 32, effort.seeds);
+    let tried = |study: Study, frames| Ok(Trial::of(&lab.measure(study.in_frames(frames))?));
     Ok(Claims {
-        table: [
-            tried("the table of masks", &antialiased, &TABLE, 8)?,
-            tried("the table of masks without antialiasing", &centred, &TABLE, 8)?,
-        ],
-        dither: tried("dithered numbers of samples", &antialiased, &DITHERED, 8)?,
-        rounds: tried("rounds stratified together", &antialiased, &rounds, 4)?,
-        hash_rounds: tried("rounds of hashing", &antialiased, &HASH_ROUNDS, 8)?,
+        variants: tried(parse(studies::VARIANTS)?, frames)?,
+        masks: tried(parse(studies::MASKS)?, frames.centred())?,
+        rounds: tried(parse(studies::ROUNDS)?, frames)?,
     })
 }
 
 /// SLAB along its dial, without antialiasing, on every scene that there is.
 ///
 /// # Errors
-/// As [`screendoor_scene::scene::load`] and [`screendoor_designs::Configured::replay`].
-pub(in crate::study) fn dial(models: Option<&Path>, side: u32, seeds: u32) -> Result<Trial> {
-    let along = DIAL.map(dialled);
-    let mut designs: Vec<&str> = along.iter().map(String::as_str).collect();
-    designs.push(DISCRETE);
-    designs.extend(ENDS);
-    let scenes = scenes(models, (side / 2).max(16), PatternKind::Centre)?;
-    trial(&scenes, &designs, SLAB_LAYERS, seeds, false)
-}
-
-fn trial(
-    scenes: &[Named],
-    designs: &[&str],
-    samples: u32,
-    seeds: u32,
-    antialiased: bool,
-) -> Result<Trial> {
-    let side = scenes.first().map_or(0, |(_, trace)| trace.header().width);
-    let scenes = scenes
-        .iter()
-        .map(|(name, trace)| {
-            Ok(TriedScene { name, variants: tried(trace, designs, samples, seeds)? })
-        })
-        .collect::<Result<_>>()?;
-    Ok(Trial { samples, side, seeds, antialiased, scenes })
-}
-
-fn tried(trace: &Trace, designs: &[&str], samples: u32, seeds: u32) -> Result<Vec<Variant>> {
-    let exact = replay("exact", trace, samples, 0)?.picture;
-    let covered = PixelClasses::of(trace, samples)?.covered;
-    let exact_blocks = averaged(&exact, BLOCK);
-    let side = exact.width() / BLOCK;
-    let frame = Region::frame(TileGrid::new(side, side));
-    let variant = |design: &&str| {
-        let mut whole = Ensemble::new(&exact, &[&covered]);
-        let mut blocks = Ensemble::new(&exact_blocks, &[&frame]);
-        for seed in 0..seeds {
-            let picture = replay(design, trace, samples, seed)?.picture;
-            blocks.add(&averaged(&picture, BLOCK));
-            whole.add(&picture);
-        }
-        let design = design.to_string();
-        let [errors, blocks] = [whole, blocks].map(|e| e.finish().swap_remove(0));
-        Ok(Variant { design, errors, blocks: blocks.rmse })
-    };
-    designs.iter().map(variant).collect()
+/// As [`Lab`] measures.
+pub(in crate::study) fn dial(lab: &Lab<'_>, effort: Effort) -> Result<Trial> {
+    let frames = Frames::new(effort.claims_side(), 32, effort.seeds).centred();
+    Ok(Trial::of(&lab.measure(parse(studies::DIAL)?.in_frames(frames))?))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use screendoor_designs::configure;
+    use crate::study::publications::experiment::Quiet;
 
     #[test]
-    fn every_variant_is_a_design() {
-        let named = TABLE.iter().chain(&DITHERED).chain(STRATIFIED.iter().flatten());
-        let all = named.chain(&HASH_ROUNDS).chain(&ENDS).chain(&[DISCRETE]);
-        for spec in all.map(ToString::to_string).chain(DIAL.map(dialled)) {
-            configure(&spec, &[]).unwrap();
-        }
+    fn the_study_files_have_the_designs_that_are_spoken_of() {
+        let files = |study: Result<Study>| study.unwrap().designs;
+        let (variants, masks, rounds, along) = (
+            files(parse(studies::VARIANTS)),
+            files(parse(studies::MASKS)),
+            files(parse(studies::ROUNDS)),
+            files(parse(studies::DIAL)),
+        );
+        let has =
+            |list: &[String], design: &str| assert!(list.iter().any(|d| d == design), "{design}");
+        let at_eight = TABLE.iter().chain(&DITHERED).chain(&HASH_ROUNDS);
+        at_eight.for_each(|design| has(&variants, design));
+        assert_eq!(masks, TABLE);
+        assert_eq!(rounds, STRATIFIED.concat());
+        DIAL.map(dialled).iter().for_each(|design| has(&along, design));
+        ENDS.iter().chain([&DISCRETE]).for_each(|design| has(&along, design));
     }
 
     #[test]
     fn rounds_stratified_together_are_less_noisy_than_apart() {
-        let spec = SceneSpec::all(None).find(|spec| spec.label() == "builtin:cloth").unwrap();
-        let trace = spec.capture(None, 48, PatternKind::Auto).unwrap().unwrap();
-        let designs: Vec<&str> = STRATIFIED.into_iter().flatten().collect();
-        let found = trial(&[("builtin:cloth", trace)], &designs, 4, 3, true).unwrap();
+        let quiet = Quiet::new();
+        let study = parse(studies::ROUNDS).unwrap().only(|s| s.drawn() == "builtin:cloth");
+        let found = quiet.lab().measure(study.in_frames(Frames::new(48, 32, 3))).unwrap();
+        let found = Trial::of(&found);
         for [apart, together] in STRATIFIED {
-            let rmse = |d: &str| found.scenes[0].variant(d).unwrap().errors.rmse.value;
+            let rmse = |d: &str| found.scenes[0].variant(d).unwrap().covered.rmse.value;
             let ratio = rmse(together) / rmse(apart);
             // LK's surfaces differ from round to round, so that it gains little. Steps of
             // alpha N from round to round, which repeat, would make it 1.2.
@@ -250,23 +167,25 @@ mod tests {
 
     #[test]
     fn a_trial_has_every_scene_and_variant_and_finds_a_biased_one() {
-        let trace = |name: &'static str| {
-            let find = |spec: &&&SceneSpec| spec.label() == name;
-            let all = SceneSpec::all(None).collect::<Vec<_>>();
-            let spec = all.iter().find(find).unwrap();
-            (name, spec.capture(None, 32, PatternKind::Auto).unwrap().unwrap())
-        };
-        let scenes = [trace("builtin:cloth"), trace("builtin:hair")];
-        let found = trial(&scenes, &["exact", "enderton", "kbuffer:layers=2"], 4, 3, true).unwrap();
+        let quiet = Quiet::new();
+        let mut study = parse(studies::ROUNDS)
+            .unwrap()
+            .only(|s| ["builtin:cloth", "builtin:hair"].contains(&s.drawn()));
+        study.designs = ["exact", "enderton", "kbuffer:layers=2"].map(String::from).to_vec();
+        study.baseline = study.designs[0].clone();
+        let found =
+            Trial::of(&quiet.lab().measure(study.in_frames(Frames::new(32, 32, 3))).unwrap());
         assert_eq!((found.side, found.samples, found.scenes.len()), (32, 4, 2));
+        assert_eq!(found.scenes[0].name, "builtin:cloth");
         for scene in &found.scenes {
-            let rmse = |design: &str| scene.variant(design).unwrap().errors.rmse.value;
+            let rmse = |design: &str| scene.variant(design).unwrap().covered.rmse.value;
             assert_eq!(rmse("exact"), 0.0);
             assert!(rmse("enderton") > 1.0 && rmse("kbuffer:layers=2") > 1.0);
-            let noise = |d: &str| scene.variant(d).unwrap().errors.variance.unwrap();
-            assert!(noise("enderton") > 1.0 && noise("kbuffer:layers=2") < 1e-9);
+            // A design without seeds has one replay, whose error is bias alone.
+            let noise = |d: &str| scene.variant(d).unwrap().covered.variance;
+            assert!(noise("enderton").unwrap() > 1.0 && noise("kbuffer:layers=2").is_none());
             // Noise averages out over blocks, an error that has one sign less.
-            let left = |d: &str| scene.variant(d).unwrap().blocks.value / rmse(d);
+            let left = |d: &str| scene.variant(d).unwrap().blocks.unwrap().value / rmse(d);
             assert!(left("enderton") < left("kbuffer:layers=2"));
         }
     }

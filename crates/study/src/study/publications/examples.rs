@@ -1,11 +1,12 @@
 //! The two examples and the cases of bias of Enderton et al. (E, 2011), which calls for
 //! every method the standard deviation of one pixel: as printed, by enumeration of every
-//! mask, and as the designs give it.
+//! mask, and as the designs give it. No study: it is single pixels' moments, channel by
+//! channel, that are printed.
 
 use serde::Serialize;
 
 use crate::metrics::Estimate;
-use crate::study::publications::{replay, whole_layers};
+use crate::study::publications::{pictures, whole_layers};
 use screendoor_rop::stochastic::Method;
 use screendoor_trace::error::Result;
 
@@ -154,8 +155,8 @@ const SEEDS: u32 = 16;
 fn measured(example: &Example, spec: &str) -> Result<Moments> {
     let trace = whole_layers(SIDE, example.samples, example.background, &example.layers)?;
     let (mut sums, mut squares, mut count) = ([0.0; 3], [0.0; 3], 0.0);
-    for seed in 0..SEEDS {
-        let picture = replay(spec, &trace, example.samples, seed)?.picture;
+    for picture in pictures(spec, &trace, example.samples, SEEDS)? {
+        let picture = picture?;
         for (x, y) in (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| (x, y))) {
             for (i, c) in picture.get(x, y).into_iter().enumerate() {
                 sums[i] += c;
@@ -355,9 +356,9 @@ fn too_bright() -> Result<BiasCase> {
 fn share(example: &Example, method: Method, is: impl Fn(f64) -> bool) -> Result<Estimate> {
     let trace = whole_layers(SIDE, example.samples, example.background, &example.layers)?;
     let mut shares = Vec::new();
-    for seed in 0..SEEDS {
-        let picture =
-            replay(&spec(Masks::Stratified, method), &trace, example.samples, seed)?.picture;
+    let spec = spec(Masks::Stratified, method);
+    for picture in pictures(&spec, &trace, example.samples, SEEDS)? {
+        let picture = picture?;
         let pixels = (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| (x, y)));
         let count = pixels.filter(|(x, y)| is(picture.get(*x, *y)[0])).count();
         shares.push(count as f64 / f64::from(SIDE * SIDE));

@@ -2,8 +2,8 @@
 
 use crate::study::publications::noise::{CORRELATION_SEEDS, FigureNoise, Noise, edge_noise, noise};
 use crate::study::publications::sampling::layers;
-use crate::study::publications::table_1::{SCENES, Table1Scene};
-use crate::study::publications::{Effort, capture, replay};
+use crate::study::publications::table_1::study_of;
+use crate::study::publications::{Effort, capture, pictures, replay};
 use screendoor_scene::capture::CaptureOptions;
 use screendoor_scene::scene;
 use screendoor_trace::error::Result;
@@ -32,19 +32,6 @@ pub(super) fn gallery() -> Result<Vec<(String, Picture)>> {
 /// A picture by its name.
 pub type NamedPicture = (&'static str, Picture);
 
-/// The picture averaged over blocks of `side` × `side` pixels.
-pub(super) fn averaged(picture: &Picture, side: u32) -> Picture {
-    let grid = TileGrid::new(picture.width() / side, picture.height() / side);
-    Picture::from_fn(grid, |x, y| {
-        let mut sum = [0.0; 3];
-        for (dx, dy) in (0..side).flat_map(|dy| (0..side).map(move |dx| (dx, dy))) {
-            let colour = picture.get(x * side + dx, y * side + dy);
-            sum.iter_mut().zip(colour).for_each(|(s, c)| *s += c);
-        }
-        sum.map(|s| s / f64::from(side * side))
-    })
-}
-
 /// A rectangle of a picture.
 fn crop(picture: &Picture, [x0, y0]: [u32; 2], side: u32) -> Picture {
     Picture::from_fn(TileGrid::new(side, side), |x, y| picture.get(x0 + x, y0 + y))
@@ -68,11 +55,9 @@ impl Panels<'_> {
         let exact = (self.part)(self.exact);
         let mut list = Vec::new();
         for (name, design) in panels {
-            let mut shown = Vec::new();
-            for seed in 0..self.seeds {
-                let picture = replay(design, self.trace, self.samples, seed)?.picture;
-                shown.push((self.part)(&picture));
-            }
+            let drawn = pictures(design, self.trace, self.samples, self.seeds)?;
+            let shown: Vec<Picture> =
+                drawn.map(|picture| Ok((self.part)(&picture?))).collect::<Result<_>>()?;
             list.push(noise(design, self.samples, &shown, &exact));
             self.pictures.extend(shown.into_iter().next().map(|picture| (*name, picture)));
         }
@@ -82,7 +67,7 @@ impl Panels<'_> {
 
 /// The pictures by name, and the noise in them.
 pub(super) fn figures(effort: Effort) -> Result<(Vec<NamedPicture>, FigureNoise)> {
-    let mut pictures = Vec::new();
+    let mut shown = Vec::new();
     let seeds = effort.seeds;
     let whole = |p: &Picture| p.clone();
     // Figure 1, left: the ramps.
@@ -91,7 +76,7 @@ pub(super) fn figures(effort: Effort) -> Result<(Vec<NamedPicture>, FigureNoise)
     let ramps = capture("builtin:ramps", &options, false)?;
     let exact = replay("exact", &ramps, 16, 0)?.picture;
     let (trace, samples, part, exact) = (&ramps, 16, &whole, &exact);
-    let mut figure = Panels { trace, samples, exact, seeds, part, pictures: &mut pictures };
+    let mut figure = Panels { trace, samples, exact, seeds, part, pictures: &mut shown };
     let dithering = figure.draw(&[("figure-1-enderton", "enderton"), ("figure-1-lk", "lk")])?;
     let edges = ["enderton", "lk"]
         .into_iter()
@@ -101,7 +86,7 @@ pub(super) fn figures(effort: Effort) -> Result<(Vec<NamedPicture>, FigureNoise)
     let eight = layers("count=8,alpha=0.1", 128, 8)?;
     let exact = replay("exact", &eight, 8, 0)?.picture;
     let (trace, samples, exact, seeds) = (&eight, 8, &exact, CORRELATION_SEEDS);
-    let mut figure = Panels { trace, samples, exact, seeds, part, pictures: &mut pictures };
+    let mut figure = Panels { trace, samples, exact, seeds, part, pictures: &mut shown };
     let correlation = figure.draw(&[
         ("figure-3-lk2011", "lk"),
         ("figure-3-sobol", "lk:reference=sobol"),
@@ -112,36 +97,37 @@ pub(super) fn figures(effort: Effort) -> Result<(Vec<NamedPicture>, FigureNoise)
     ])?;
     // Figures 1, right, 6 and 10: the cloth, triangles in random order.
     let side = effort.side;
-    let spec = built_in("builtin:cloth");
-    let cloth = capture(spec.source, &spec.options(side), false)?;
+    let cloth = built_in("builtin:cloth", effort)?;
     let inset = [side * 3 / 8, side * 5 / 16];
     let corner = |p: &Picture| crop(p, inset, side / 4);
     let seeds = effort.seeds;
     let exact = replay("exact", &cloth, 64, 0)?.picture;
     let (trace, samples, exact, part) = (&cloth, 64, &exact, &corner);
-    let mut figure = Panels { trace, samples, exact, seeds, part, pictures: &mut pictures };
+    let mut figure = Panels { trace, samples, exact, seeds, part, pictures: &mut shown };
     let cloth_noise =
         figure.draw(&[("figure-1-cloth-enderton", "enderton"), ("figure-1-cloth-lk", "lk")])?;
     let exact = replay("exact", &cloth, 16, 0)?.picture;
     let (samples, exact) = (16, &exact);
-    let mut figure = Panels { trace, samples, exact, seeds, part, pictures: &mut pictures };
+    let mut figure = Panels { trace, samples, exact, seeds, part, pictures: &mut shown };
     let sorting =
         figure.draw(&[("figure-6-unsorted", "lk:sort=false"), ("figure-6-sorted", "lk")])?;
     if !effort.brief {
         for (name, spec) in [("figure-10-enderton", "enderton"), ("figure-10-lk", "lk")] {
-            pictures.push((name, replay(spec, &cloth, 16, 0)?.picture));
+            shown.push((name, replay(spec, &cloth, 16, 0)?.picture));
         }
         // Figure 9: the motor.
-        let spec = built_in("builtin:engine");
-        let engine = capture(spec.source, &spec.options(side), spec.white)?;
+        let engine = built_in("builtin:engine", effort)?;
         for (name, design) in [("figure-9-enderton", "enderton"), ("figure-9-lk", "lk")] {
-            pictures.push((name, replay(design, &engine, 16, 0)?.picture));
+            shown.push((name, replay(design, &engine, 16, 0)?.picture));
         }
     }
     let noise = FigureNoise { dithering, edges, cloth: cloth_noise, correlation, sorting };
-    Ok((pictures, noise))
+    Ok((shown, noise))
 }
 
-fn built_in(source: &str) -> &'static Table1Scene {
-    SCENES.iter().find(|s| s.source == source).expect("it is in the table")
+/// A scene as table 1 has it.
+fn built_in(source: &str, effort: Effort) -> Result<Trace> {
+    let study = study_of(effort)?;
+    let entry = study.scenes.iter().find(|s| s.drawn() == source).expect("it is in the table");
+    capture(source, &entry.options(), entry.white)
 }

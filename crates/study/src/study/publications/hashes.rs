@@ -1,12 +1,14 @@
 //! What matters of a reference-value hash: how many permutations it reaches, whether
-//! surfaces and seeds are correlated, and what that does to pictures.
+//! surfaces and seeds are correlated, and what that does to pictures. No study: hashes are
+//! tried on numbers, and the pictures are of layers that no scene has.
 
 use std::collections::HashSet;
 
 use serde::Serialize;
 
 use crate::metrics::{Ensemble, Estimate, Region};
-use crate::study::publications::{replay, whole_layers};
+use crate::study::measure;
+use crate::study::publications::{pictures, replay, whole_layers};
 use screendoor_rop::{PixelIndex, Reference, ReferenceKey, Threshold};
 use screendoor_trace::error::Result;
 use screendoor_trace::param::Options;
@@ -134,15 +136,15 @@ fn row(values: Values, name: &'static str, seeds: u32) -> Result<HashRow> {
     let layers: Vec<_> = (0..8).map(|i| (gray(i), 0.3)).collect();
     let trace = whole_layers(SIDE, 8, [0.0; 3], &layers)?;
     let exact = replay("exact", &trace, 8, 0)?.picture;
-    let blocks = super::figures::averaged(&exact, 4);
+    let blocks = measure::averaged(&exact, 4);
     let frame = Region::frame(exact.grid());
     let block_frame = Region::frame(TileGrid::new(SIDE / 4, SIDE / 4));
     let mut whole = Ensemble::new(&exact, &[&frame]);
     let mut averaged = Ensemble::new(&blocks, &[&block_frame]);
-    for seed in 0..seeds {
-        let spec = format!("lk:reference={name},prehash={prehash}");
-        let picture = replay(&spec, &trace, 8, seed)?.picture;
-        averaged.add(&super::figures::averaged(&picture, 4));
+    let spec = format!("lk:reference={name},prehash={prehash}");
+    for picture in pictures(&spec, &trace, 8, seeds)? {
+        let picture = picture?;
+        averaged.add(&measure::averaged(&picture, 4));
         whole.add(&picture);
     }
     let (whole, averaged) = (whole.finish().swap_remove(0), averaged.finish().swap_remove(0));

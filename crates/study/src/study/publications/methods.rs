@@ -1,19 +1,19 @@
 //! What the publications say of methods: Enderton's examples, Wyman's probabilities,
-//! hashes, and LK figure 8.
-
-use std::path::Path;
+//! hashes, and LK figure 8. The first three enumerate or try small numbers rather than
+//! replaying designs on scenes and so are no studies; the rest is.
 
 use serde::Serialize;
 
-use crate::metrics::{Ensemble, Estimate, PixelClasses};
+use crate::study::file::SceneEntry;
 use crate::study::publications::claims::{Claims, claims};
 use crate::study::publications::examples::{BiasCase, ExampleRow, bias_cases, examples};
+use crate::study::publications::experiment::{Frames, Lab, MeasuredScene, parse, studies};
 use crate::study::publications::hashes::{HashRow, hashes};
-use crate::study::publications::{Effort, NamedPicture, capture, replay};
+use crate::study::publications::{Effort, NamedPicture};
+use crate::study::run::Store;
 use screendoor_rop::{visible_independent, visible_stratified};
-use screendoor_scene::capture::CaptureOptions;
 use screendoor_trace::error::Result;
-use screendoor_trace::trace::{Statistics, statistics};
+use screendoor_trace::picture::read;
 
 /// Everything that is reproduced of the methods.
 #[derive(Debug)]
@@ -59,34 +59,27 @@ pub const TABLE_BITS: u32 = 4;
 pub struct Figure8 {
     /// What was drawn.
     pub source: &'static str,
-    /// Its trace in numbers.
-    pub statistics: Statistics,
-    /// Designs with their errors in 8-bit units over the covered pixels, against the
-    /// exact picture of the same samples.
-    pub rmse: Vec<(&'static str, Estimate)>,
+    /// The scene with one run a design.
+    pub scene: MeasuredScene,
 }
 
-/// Runs all of it. Models are looked for in the folder `models`.
+/// Runs all of it.
 ///
 /// # Errors
-/// As [`screendoor_scene::scene::load`] and [`screendoor_designs::Configured::replay`].
-pub fn methods(
-    models: Option<&Path>,
-    effort: Effort,
-    mut progress: impl FnMut(&str, u64, u64),
-) -> Result<Methods> {
-    progress("Enderton's examples", 0, 5);
+/// As [`Lab`] measures.
+pub fn methods(lab: &Lab<'_>, effort: Effort) -> Result<Methods> {
+    let progress = |what, done| (lab.watch)(what, done, 5);
+    progress("Enderton's examples", 0);
     let (examples, bias_cases) = (examples()?, bias_cases()?);
-    progress("Wyman's probabilities", 1, 5);
+    progress("Wyman's probabilities", 1);
     let probabilities = probabilities();
-    progress("hashes", 2, 5);
+    progress("hashes", 2);
     let hashes = match effort.brief {
         true => Vec::new(),
         false => hashes(effort.seeds_of_means.min(64))?,
     };
-    progress("LK figure 8", 3, 5);
-    let (figure_8, pictures) = figure_8(models, effort)?;
-    let claims = claims(models, effort, |what| progress(what, 4, 5))?;
+    let (figure_8, pictures) = figure_8(lab, effort)?;
+    let claims = claims(lab, effort)?;
     Ok(Methods { effort, examples, bias_cases, probabilities, hashes, figure_8, claims, pictures })
 }
 
@@ -132,48 +125,25 @@ fn enumerated(b: u32, s: u32, t: u32) -> [f64; 2] {
     [seen / all, probability]
 }
 
-const FIGURE_8_DESIGNS: [&str; 6] = [
-    "lk",
-    "systematic",
-    "enderton",
-    "enderton:mask=naive",
-    "lk:method=depth-correction",
-    "enderton:method=depth-correction",
-];
+/// The panels of the figure, by the pictures' names.
+const PANELS: [(&str, &str); 2] = [("figure-8-lk", "lk"), ("figure-8-enderton", "enderton")];
 
-fn figure_8(models: Option<&Path>, effort: Effort) -> Result<(Figure8, Vec<NamedPicture>)> {
-    const SAMPLES: u32 = 16;
+fn figure_8(lab: &Lab<'_>, effort: Effort) -> Result<(Figure8, Vec<NamedPicture>)> {
     const MODEL: &str = "openusd_smoke_000003.vdb";
-    let side = effort.side / 2;
-    let options = CaptureOptions {
-        width: side,
-        height: side,
-        samples: SAMPLES,
-        alpha: Some(0.05),
-        ..CaptureOptions::default()
+    let has_model = lab.models.is_some_and(|models| models.join(MODEL).is_file());
+    let source = if has_model { MODEL } else { "builtin:smoke" };
+    let study = parse(studies::FIGURE_8)?.only(|scene| scene.drawn() == source);
+    let study = study.in_frames(Frames::new(effort.side / 2, 16, effort.seeds));
+    let folder = lab.place(&study);
+    let scene = lab.measure(study)?.scenes(SceneEntry::title).swap_remove(0);
+    let kept = |design: &str, layer| {
+        let record = scene.variant(design).expect("it was measured");
+        read(folder.join(Store::picture_name(&record.id)), Some(layer))
     };
-    let path = models.map(|m| m.join(MODEL)).filter(|p| p.is_file());
-    let (source, trace) = match path {
-        Some(path) => (MODEL, capture(&path.display().to_string(), &options, false)?),
-        None => ("builtin:smoke", capture("builtin:smoke", &options, false)?),
-    };
-    let exact = replay("exact", &trace, SAMPLES, 0)?.picture;
-    let covered = PixelClasses::of(&trace, SAMPLES)?.covered;
-    let mut rmse = Vec::new();
-    let mut pictures = vec![];
-    for spec in FIGURE_8_DESIGNS {
-        let mut ensemble = Ensemble::new(&exact, &[&covered]);
-        for seed in 0..effort.seeds {
-            let picture = replay(spec, &trace, SAMPLES, seed)?.picture;
-            ensemble.add(&picture);
-            match (seed, spec) {
-                (0, "lk") => pictures.push(("figure-8-lk", picture)),
-                (0, "enderton") => pictures.push(("figure-8-enderton", picture)),
-                _ => {}
-            }
-        }
-        rmse.push((spec, ensemble.finish().swap_remove(0).rmse));
+    let mut pictures = Vec::new();
+    for (name, design) in PANELS {
+        pictures.push((name, kept(design, "colour")?));
     }
-    pictures.push(("figure-8-exact", exact));
-    Ok((Figure8 { source, statistics: statistics(&trace, |_| ())?, rmse }, pictures))
+    pictures.push(("figure-8-exact", kept("lk", "reference")?));
+    Ok((Figure8 { source, scene }, pictures))
 }

@@ -2,6 +2,7 @@
 
 pub mod claims;
 pub mod examples;
+pub mod experiment;
 mod figures;
 pub mod hashes;
 pub mod methods;
@@ -9,8 +10,6 @@ mod noise;
 mod reproduced;
 mod sampling;
 mod table_1;
-
-use std::path::Path;
 
 use serde::Serialize;
 
@@ -20,7 +19,10 @@ pub use reproduced::{Reproduced, measure_publication};
 pub use sampling::{FarSamples, MIXED, MeanError, RowDifference};
 pub use table_1::{Aspect, COUNTS, DESIGNS, Published, Table1, Variation};
 
-use screendoor_designs::{Configured, configure};
+use crate::study::engine::FAST;
+use crate::study::measure::replays;
+use crate::study::publications::experiment::Lab;
+use screendoor_designs::configure;
 use screendoor_rop::{ReplayOptions, Replayed};
 pub use screendoor_scene::capture::Order;
 use screendoor_scene::capture::{Capture, CaptureOptions, PatternKind, pattern};
@@ -65,7 +67,7 @@ pub struct Publications {
     /// Table 1 on one scene after the other.
     pub table_1: Vec<Table1>,
     /// Scenes of table 1 whose models were not given.
-    pub missing: Vec<&'static str>,
+    pub missing: Vec<String>,
     /// The ratio of table 1 on every scene, seen in several ways; none where brief.
     pub variations: Vec<Variation>,
     /// Figure 5: samples left to the far surface.
@@ -82,33 +84,17 @@ pub struct Publications {
     pub pictures: Vec<NamedPicture>,
 }
 
-/// Runs all experiments. Models are looked for in the folder `models`.
-/// `progress` is told what runs.
+/// Runs all experiments.
 ///
 /// # Errors
-/// As [`scene::load`] and [`Configured::replay`].
-pub fn reproduce(
-    models: Option<&Path>,
-    effort: Effort,
-    mut progress: impl FnMut(&str, u64, u64),
-) -> Result<Publications> {
-    let (mut tables, mut missing) = (Vec::new(), Vec::new());
-    let wanted = |spec: &&table_1::Table1Scene| !effort.brief || spec.is_built_in();
-    for spec in table_1::SCENES.iter().filter(wanted) {
-        let Some(source) = spec.locate(models) else {
-            missing.push(spec.source);
-            continue;
-        };
-        tables.push(spec.measure(&source, effort, &mut progress)?);
-    }
+/// As [`Lab`] measures.
+pub fn reproduce(lab: &Lab<'_>, effort: Effort) -> Result<Publications> {
+    let (table_1, missing) = table_1::tables(lab, effort)?;
     let (variations, means) = match effort.brief {
         true => (Vec::new(), Vec::new()),
-        false => (
-            table_1::vary(models, effort, &mut progress)?,
-            sampling::means(models, effort, &mut progress)?,
-        ),
+        false => (table_1::vary(lab, effort)?, sampling::means(lab, effort)?),
     };
-    progress("figures", 0, 1);
+    (lab.watch)("figures", 0, 1);
     let (pictures, noise) = figures::figures(effort)?;
     let (pixel_orders, gallery) = match effort.brief {
         true => (Vec::new(), Vec::new()),
@@ -116,7 +102,7 @@ pub fn reproduce(
     };
     Ok(Publications {
         effort,
-        table_1: tables,
+        table_1,
         missing,
         variations,
         far_samples: sampling::far_samples()?,
@@ -176,11 +162,22 @@ fn whole_layers(
     Trace::from_bytes(writer.finish()?.0, "memory")
 }
 
-fn designs(specs: &[&str]) -> Result<Vec<Configured>> {
-    specs.iter().map(|spec| configure(spec, &[])).collect()
+fn replay(spec: &str, trace: &Trace, samples: u32, seed: u32) -> Result<Replayed> {
+    configure(spec, &[])?.replay(trace, samples, seed, &options())
 }
 
-fn replay(spec: &str, trace: &Trace, samples: u32, seed: u32) -> Result<Replayed> {
-    let options = ReplayOptions { memory: MEMORY, ..ReplayOptions::default() };
-    configure(spec, &[])?.replay(trace, samples, seed, &options)
+fn options() -> ReplayOptions<'static> {
+    ReplayOptions { memory: MEMORY, ..ReplayOptions::default() }
+}
+
+/// A design's pictures, seed after seed.
+fn pictures<'a>(
+    spec: &str,
+    trace: &'a Trace,
+    samples: u32,
+    seeds: u32,
+) -> Result<impl Iterator<Item = Result<Picture>> + 'a> {
+    let design = configure(spec, &[])?;
+    Ok(replays(FAST, design, trace, samples, 0..seeds, options())
+        .map(|seed| Ok(seed?.replayed.picture)))
 }

@@ -1,10 +1,11 @@
-//! The noise that LK's figures 1, 3 and 6 show, in numbers.
+//! The noise that LK's figures 1, 3 and 6 show, in numbers. No study: it is of details of
+//! pictures, and of single rows of them.
 
 use serde::Serialize;
 
 use crate::metrics::{Estimate, PixelClasses, Region, UNIT, errors};
-use crate::study::publications::figures::averaged;
-use crate::study::publications::replay;
+use crate::study::measure::averaged;
+use crate::study::publications::pictures;
 use screendoor_trace::error::Result;
 use screendoor_trace::picture::Picture;
 use screendoor_trace::tile::TileGrid;
@@ -101,8 +102,8 @@ pub(super) fn edge_noise(
     };
     let (edges, inside): (Vec<_>, Vec<_>) = within.into_iter().partition(shared);
     let (mut at_edges, mut beside) = (Vec::new(), Vec::new());
-    for seed in 0..seeds {
-        let picture = replay(design, ramps, samples, seed)?.picture;
+    for picture in pictures(design, ramps, samples, seeds)? {
+        let picture = picture?;
         let mean_square = |pixels: &[(u32, u32)]| {
             let square = |(x, y): &(u32, u32)| (picture.get(*x, *y)[0] - ALPHA).powi(2);
             pixels.iter().map(square).sum::<f64>() / pixels.len().max(1) as f64 / (UNIT * UNIT)

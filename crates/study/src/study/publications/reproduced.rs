@@ -1,9 +1,8 @@
 //! One publication's figures, measured: what a study asks for by name.
 
-use std::path::Path;
-
 use crate::study::comparison::{Comparison, compare, compare_slab};
 use crate::study::file::Publication;
+use crate::study::publications::experiment::Lab;
 use crate::study::publications::methods::{Methods, methods};
 use crate::study::publications::{Effort, Publications, reproduce};
 use crate::study::stress::{Stability, stress_designs};
@@ -37,7 +36,7 @@ impl Reproduced {
     }
 
     /// Models that were not given, whose tables are left out.
-    pub fn missing(&self) -> &[&'static str] {
+    pub fn missing(&self) -> &[String] {
         match self {
             Reproduced::LaineKarras(p) => &p.missing,
             Reproduced::Methods(_) | Reproduced::Stability(_) => &[],
@@ -46,29 +45,24 @@ impl Reproduced {
     }
 }
 
-/// Measures a publication, with models from the folder `models` where one is given.
-/// `progress` is told what runs.
+/// Measures a publication in a lab.
 ///
 /// # Errors
 /// As [`reproduce`], [`methods`], [`compare`] and [`stress_designs`].
 pub fn measure_publication(
     publication: Publication,
-    models: Option<&Path>,
+    lab: &Lab<'_>,
     effort: Effort,
-    progress: impl FnMut(&str, u64, u64),
 ) -> Result<Reproduced> {
-    let (side, seeds) = (effort.comparison_side, effort.seeds);
     Ok(match publication {
-        Publication::LaineKarras => {
-            Reproduced::LaineKarras(Box::new(reproduce(models, effort, progress)?))
+        Publication::LaineKarras => Reproduced::LaineKarras(Box::new(reproduce(lab, effort)?)),
+        Publication::Methods => Reproduced::Methods(Box::new(methods(lab, effort)?)),
+        Publication::Slab => Reproduced::Slab(Box::new(compare_slab(lab, effort)?)),
+        Publication::Comparison => Reproduced::Comparison(Box::new(compare(lab, effort)?)),
+        Publication::Stability => {
+            Reproduced::Stability(Box::new(stress_designs(16, |what, done, total| {
+                (lab.watch)(what, done, total);
+            })?))
         }
-        Publication::Methods => Reproduced::Methods(Box::new(methods(models, effort, progress)?)),
-        Publication::Slab => {
-            Reproduced::Slab(Box::new(compare_slab(models, side, seeds, progress)?))
-        }
-        Publication::Comparison => {
-            Reproduced::Comparison(Box::new(compare(models, side, seeds, progress)?))
-        }
-        Publication::Stability => Reproduced::Stability(Box::new(stress_designs(16, progress)?)),
     })
 }

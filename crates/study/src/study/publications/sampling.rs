@@ -1,16 +1,14 @@
-//! LK's claims about sampling: expectation, figure 5, pixel orders.
-
-use std::path::Path;
+//! LK's claims about sampling: expectation, a study; figure 5 and pixel orders, which count
+//! samples and compare rows of pictures and so are none.
 
 use serde::Serialize;
 
-use crate::metrics::{Ensemble, Estimate, PixelClasses};
-use crate::study::comparison::SceneSpec;
-use crate::study::publications::{Effort, capture, replay};
-use screendoor_designs::configure;
-use screendoor_scene::capture::{Capture, CaptureOptions};
+use crate::study::publications::experiment::{Frames, Lab, parse, studies};
+use crate::study::publications::{Effort, capture, pictures, replay};
+use crate::study::record::Record;
+use screendoor_scene::capture::CaptureOptions;
 use screendoor_trace::error::Result;
-use screendoor_trace::trace::{Trace, tied_fragments};
+use screendoor_trace::trace::Trace;
 
 /// How many samples a far surface keeps under a near one, both α = 0.5 at 16
 /// samples.
@@ -30,21 +28,11 @@ pub struct FarSamples {
 #[derive(Clone, Debug, Serialize)]
 pub struct MeanError {
     /// The scene; a built-in one's name begins with `builtin:`.
-    pub scene: &'static str,
+    pub scene: String,
     /// Frame side in pixels.
     pub side: u32,
-    /// How many seeds.
-    pub seeds: u32,
-    /// The design.
-    pub design: String,
-    /// Samples per pixel.
-    pub samples: u32,
-    /// Whether it is declared unbiased.
-    pub unbiased: bool,
-    /// Mean of picture minus exact over the covered pixels, in 8-bit units.
-    pub mean: Estimate,
-    /// Root of the mean square error.
-    pub rmse: Estimate,
+    /// The run: mean and error are those over the covered pixels.
+    pub run: Record,
 }
 
 /// How far even and odd rows of an even surface lie apart.
@@ -56,63 +44,24 @@ pub struct RowDifference {
     pub difference: f64,
 }
 
-/// The designs whose expectations are measured.
-const MEAN_DESIGNS: [&str; 7] = [
-    "lk",
-    "lk:track=covered",
-    "lk:surfaces=every-fragment",
-    "lk:sort=false,compact=false",
-    "lk:reference=white",
-    "enderton",
-    "enderton:mask=naive",
-];
-
 /// The scene of which expectations are measured at several sample counts: in random order,
 /// so that surfaces mix.
 pub const MIXED: &str = "builtin:cloth";
 
 /// Mean errors on every scene that there is, at 8 samples with a quarter of the seeds; of
 /// [`MIXED`] in a larger frame, at several counts with all seeds.
-pub(super) fn means(
-    models: Option<&Path>,
-    effort: Effort,
-    progress: &mut dyn FnMut(&str, u64, u64),
-) -> Result<Vec<MeanError>> {
-    let mut list = Vec::new();
+pub(super) fn means(lab: &Lab<'_>, effort: Effort) -> Result<Vec<MeanError>> {
     let few = (effort.seeds_of_means / 4).max(2);
-    let closely = (effort.comparison_side, effort.seeds_of_means, [4, 8, 16, 64].as_slice());
-    let briefly = (effort.claims_side(), few, [8].as_slice());
-    let mixed = SceneSpec::all(models).filter(|spec| spec.label() == MIXED);
-    let each = SceneSpec::all(models).map(|spec| (spec, briefly));
-    let all = mixed.map(|spec| (spec, closely)).chain(each);
-    let total = SceneSpec::all(models).count() as u64 + 1;
-    for (done, (spec, (side, seeds, counts))) in all.enumerate() {
-        progress(&format!("expectations: {}", spec.label()), done as u64, total);
-        let Some(scene) = spec.load(models)? else { continue };
-        let options = CaptureOptions { samples: 64, ..spec.options(side) };
-        let trace = Capture::new(&scene, &options)?.to_memory(|_, _| ())?;
-        for samples in counts {
-            let exact = replay("exact", &trace, *samples, 0)?.picture;
-            let covered = PixelClasses::of(&trace, *samples)?.covered;
-            let tied = tied_fragments(&trace, *samples)?;
-            for variant in MEAN_DESIGNS {
-                let mut ensemble = Ensemble::new(&exact, &[&covered]);
-                for seed in 0..seeds {
-                    ensemble.add(&replay(variant, &trace, *samples, seed)?.picture);
-                }
-                let design = configure(variant, &[])?;
-                let e = &ensemble.finish()[0];
-                list.push(MeanError {
-                    scene: spec.label(),
-                    side,
-                    seeds,
-                    design: design.label(),
-                    samples: *samples,
-                    unbiased: design.promises().unbiased.holds(tied),
-                    mean: e.mean,
-                    rmse: e.rmse,
-                });
-            }
+    let closely = Frames::new(effort.comparison_side, 64, effort.seeds_of_means);
+    let briefly = Frames::new(effort.claims_side(), 64, few);
+    let mixed = parse(studies::EXPECTATIONS_CLOSELY)?.only(|scene| scene.drawn() == MIXED);
+    let mut list = Vec::new();
+    for study in [mixed.in_frames(closely), parse(studies::EXPECTATIONS)?.in_frames(briefly)] {
+        let results = lab.measure(study)?.results;
+        for run in results.records {
+            let entry = results.study.scenes.iter().find(|scene| scene.name == run.scene);
+            let Some(entry) = entry else { continue };
+            list.push(MeanError { scene: entry.title(), side: entry.size[0], run });
         }
     }
     Ok(list)
@@ -169,8 +118,8 @@ pub(super) fn pixel_orders(effort: Effort) -> Result<Vec<RowDifference>> {
         let (mut sum, mut count) = (0.0, 0.0);
         for alpha in [0.1, 0.2, 0.3, 0.45, 0.6] {
             let trace = layers(&format!("count=1,alpha={alpha}"), 128, 4)?;
-            for seed in 0..effort.seeds_of_means.min(32) {
-                let picture = replay(spec, &trace, 4, seed)?.picture;
+            for picture in pictures(spec, &trace, 4, effort.seeds_of_means.min(32))? {
+                let picture = picture?;
                 let mut rows = [0.0; 2];
                 for y in 0..128 {
                     rows[y as usize % 2] +=

@@ -1,17 +1,13 @@
 //! LK table 1 on scenes that we have, and how its ratio depends on what is seen.
 
-use std::path::Path;
-
 use serde::Serialize;
 
-use crate::metrics::{Estimate, PixelClasses, errors};
-use crate::study::comparison::SceneSpec;
-use crate::study::publications::{Effort, MEMORY, capture, designs, replay};
-use crate::study::{Plan, Run, measure};
-use screendoor_scene::capture::{CameraOptions, Capture, CaptureOptions, Faces, Order};
-use screendoor_scene::scene;
+use crate::metrics::Estimate;
+use crate::study::file::{SceneEntry, Study};
+use crate::study::publications::Effort;
+use crate::study::publications::experiment::{Frames, Lab, MeasuredScene, parse, studies};
+use screendoor_scene::capture::Order;
 use screendoor_trace::error::Result;
-use screendoor_trace::trace::{SampleMask, Statistics, Trace, statistics};
 
 /// Sample counts of LK's table 1.
 pub const COUNTS: [u32; 5] = [4, 8, 16, 32, 64];
@@ -19,18 +15,18 @@ pub const COUNTS: [u32; 5] = [4, 8, 16, 32, 64];
 /// sampling without any stratification.
 pub const DESIGNS: [&str; 3] = ["lk", "enderton", "enderton:mask=naive"];
 
-/// A scene of table 1 and how it is captured.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Table1Scene {
-    pub name: &'static str,
-    /// A built-in scene, or a file in the models' folder.
-    pub source: &'static str,
-    origin: &'static str,
-    pub stands_for: Published,
-    alpha: f32,
-    pub white: bool,
-    order: Order,
-}
+/// A scene of table 1: its name in the study file, where it comes from, and what it stands
+/// beside.
+const SCENES: [(&str, &str, Published); 4] = [
+    ("cycloidal", "CAD motor, 376 520 triangles (trimesh repository, MIT)", Published::Motor),
+    ("engine", "built-in", Published::Motor),
+    (
+        "drape",
+        "multi-layer garment, 84 159 triangles, untextured (Codim-IPC repository, Apache-2.0)",
+        Published::Cloth,
+    ),
+    ("cloth", "built-in", Published::Cloth),
+];
 
 /// Which column of the published table a scene stands beside.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
@@ -51,65 +47,22 @@ impl Published {
     }
 }
 
-pub(super) const SCENES: [Table1Scene; 4] = [
-    Table1Scene {
-        name: "cycloidal",
-        source: "cycloidal.glb",
-        origin: "CAD motor, 376 520 triangles (trimesh repository, MIT)",
-        stands_for: Published::Motor,
-        alpha: 0.3,
-        white: true,
-        order: Order::Api,
-    },
-    Table1Scene {
-        name: "engine",
-        source: "builtin:engine",
-        origin: "built-in",
-        stands_for: Published::Motor,
-        alpha: 0.3,
-        white: true,
-        order: Order::Api,
-    },
-    Table1Scene {
-        name: "drape",
-        source: "codimipc_multilayer_drape.obj",
-        origin: "multi-layer garment, 84 159 triangles, untextured (Codim-IPC repository, Apache-2.0)",
-        stands_for: Published::Cloth,
-        alpha: 0.4,
-        white: false,
-        order: Order::Random,
-    },
-    Table1Scene {
-        name: "cloth",
-        source: "builtin:cloth",
-        origin: "built-in",
-        stands_for: Published::Cloth,
-        alpha: 0.4,
-        white: false,
-        order: Order::Random,
-    },
-];
-
 /// Table 1 on one scene.
 #[derive(Clone, Debug, Serialize)]
 pub struct Table1 {
-    /// A short name.
-    pub name: &'static str,
     /// Where the scene comes from.
     pub origin: &'static str,
     /// What it stands beside.
     pub stands_for: Published,
-    /// Its trace in numbers.
-    pub statistics: Statistics,
-    /// Runs of [`DESIGNS`], sample count after sample count.
-    pub runs: Vec<Run>,
+    /// The scene with the runs of [`DESIGNS`].
+    pub scene: MeasuredScene,
 }
 
 /// One way to see a scene, at 16 samples.
 #[derive(Clone, Debug, Serialize)]
 pub struct Variation {
     /// Which scene; a built-in one's name begins with `builtin:`.
-    pub scene: &'static str,
+    pub scene: String,
     /// What differs.
     #[serde(skip)]
     pub aspect: Aspect,
@@ -138,107 +91,78 @@ pub enum Aspect {
     Background,
 }
 
-impl Table1Scene {
-    /// How it is captured, in a square frame.
-    pub fn options(&self, side: u32) -> CaptureOptions {
-        CaptureOptions {
-            width: side,
-            height: side,
-            alpha: Some(self.alpha),
-            faces: Faces::Both,
-            order: self.order,
-            ..CaptureOptions::default()
-        }
-    }
+/// The study of the table. `brief` is without the scenes that need models.
+pub(super) fn study_of(effort: Effort) -> Result<Study> {
+    let study = parse(studies::TABLE_1)?.only(|scene| !effort.brief || scene.is_built_in());
+    Ok(study.in_frames(Frames::new(effort.side, 64, effort.seeds)))
 }
 
-impl Table1Scene {
-    /// Whether it needs no file.
-    pub fn is_built_in(&self) -> bool {
-        scene::path_of(self.source).is_none()
-    }
-
-    /// The scene as it can be loaded; `None` for a model that is not there.
-    pub fn locate(&self, models: Option<&Path>) -> Option<String> {
-        let Some(file) = scene::path_of(self.source) else {
-            return Some(self.source.to_string());
-        };
-        let path = models?.join(file);
-        path.is_file().then(|| path.display().to_string())
-    }
-
-    /// Runs the table on the scene at `source`.
-    pub fn measure(
-        &self,
-        source: &str,
-        effort: Effort,
-        progress: &mut dyn FnMut(&str, u64, u64),
-    ) -> Result<Table1> {
-        let trace = capture(source, &self.options(effort.side), self.white)?;
-        let plan =
-            Plan { designs: designs(&DESIGNS)?, samples: COUNTS.to_vec(), seeds: effort.seeds };
-        let measured = measure(&trace, &plan, MEMORY, |what, done, total| {
-            progress(&format!("{}: {what}", self.name), done, total);
-        })?;
-        Ok(Table1 {
-            name: self.name,
-            origin: self.origin,
-            stands_for: self.stands_for,
-            statistics: statistics(&trace, |_| ())?,
-            runs: measured.runs.into_iter().map(|m| m.run).collect(),
-        })
-    }
+/// The table on every scene of its that is there, and which are not.
+pub(super) fn tables(lab: &Lab<'_>, effort: Effort) -> Result<(Vec<Table1>, Vec<String>)> {
+    let found = lab.measure(study_of(effort)?)?;
+    let of_scene = |scene: MeasuredScene| {
+        let (_, origin, stands_for) = SCENES.into_iter().find(|s| s.0 == scene.name)?;
+        Some(Table1 { origin, stands_for, scene })
+    };
+    let scenes = found.scenes(|entry| entry.name.clone());
+    Ok((scenes.into_iter().filter_map(of_scene).collect(), found.missing))
 }
 
 /// Every scene that there is, seen in several ways.
 ///
 /// # Errors
-/// As [`screendoor_scene::scene::load`] and [`screendoor_designs::Configured::replay`].
-pub(super) fn vary(
-    models: Option<&Path>,
-    effort: Effort,
-    progress: &mut dyn FnMut(&str, u64, u64),
-) -> Result<Vec<Variation>> {
-    let mut list = Vec::new();
-    for spec in SceneSpec::all(models) {
-        let Some(scene) = spec.load(models)? else { continue };
-        let ways = variations(&spec.options(effort.comparison_side));
-        let total = ways.len() as u64;
-        for (done, way) in ways.into_iter().enumerate() {
-            progress(&format!("{}: {}", spec.label(), way.what), done as u64, total);
-            let trace = Capture::new(&scene, &way.options)?.to_memory(|_, _| ())?;
-            list.push(variation(spec.label(), way, &trace, effort)?);
+/// As [`Lab`] measures.
+pub(super) fn vary(lab: &Lab<'_>, effort: Effort) -> Result<Vec<Variation>> {
+    let mut study =
+        parse(studies::VIEWS)?.in_frames(Frames::new(effort.comparison_side, 32, effort.seeds));
+    let mut ways = Vec::new();
+    for entry in std::mem::take(&mut study.scenes) {
+        for (i, way) in variations(&entry).into_iter().enumerate() {
+            let name = format!("{}.{i}", entry.name);
+            study.scenes.push(SceneEntry { name: name.clone(), ..way.entry.clone() });
+            ways.push((name, entry.title(), way));
         }
     }
-    Ok(list)
+    let samples = study.samples[0];
+    let results = lab.measure(study)?.results;
+    let of_way = |(name, scene, way): (String, String, Way)| {
+        let runs = DESIGNS.map(|design| results.record(&name, design, samples));
+        let first = runs[0]?;
+        let covered = first.covered.pixels.max(1) as f64;
+        Some(Variation {
+            scene,
+            aspect: way.aspect,
+            what: way.what,
+            fragments_per_pixel: first.fragments as f64 / covered,
+            edge_share: first.edges.pixels as f64 / covered,
+            rmse: [first, runs[1]?, runs[2]?].map(|r| r.covered.rmse),
+        })
+    };
+    Ok(ways.into_iter().filter_map(of_way).collect())
 }
 
 /// One way to see a scene.
 struct Way {
     aspect: Aspect,
     what: String,
-    options: CaptureOptions,
+    entry: SceneEntry,
 }
 
 /// Other ways to see a scene: angles, sizes, orders, backgrounds.
-fn variations(base: &CaptureOptions) -> Vec<Way> {
+fn variations(base: &SceneEntry) -> Vec<Way> {
     let mut list = Vec::new();
-    let mut add = |aspect, what: &str, options| {
-        list.push(Way { aspect, what: what.to_string(), options });
+    let mut add = |aspect, what: &str, entry| {
+        list.push(Way { aspect, what: what.to_string(), entry });
     };
-    let side = base.width;
+    let side = base.size[0];
     add(Aspect::Nothing(base.order), &format!("{side}×{side} pixels, its order"), base.clone());
     for yaw in [120.0, 210.0, 300.0] {
-        let camera = CameraOptions { angle: Some([yaw, 20.0]), ..base.camera };
-        add(Aspect::Angle, &format!("from {yaw}°"), CaptureOptions { camera, ..base.clone() });
+        let angle = Some([yaw, 20.0]);
+        add(Aspect::Angle, &format!("from {yaw}°"), SceneEntry { angle, ..base.clone() });
     }
-    for side in [base.width * 2, base.width / 2] {
-        let what = format!("{side}×{side} pixels");
-        add(
-            Aspect::Size(side),
-            &what,
-            CaptureOptions { width: side, height: side, ..base.clone() },
-        );
+    for side in [side * 2, side / 2] {
+        let entry = SceneEntry { size: [side, side], ..base.clone() };
+        add(Aspect::Size(side), &format!("{side}×{side} pixels"), entry);
     }
     for (what, order) in [
         ("triangles in API order", Order::Api),
@@ -247,41 +171,31 @@ fn variations(base: &CaptureOptions) -> Vec<Way> {
         ("far to near", Order::FarToNear),
     ] {
         if order != base.order {
-            add(Aspect::Order(order), what, CaptureOptions { order, ..base.clone() });
+            add(Aspect::Order(order), what, SceneEntry { order, ..base.clone() });
         }
     }
-    let white = CaptureOptions { background: Some([1.0; 3]), ..base.clone() };
+    let white = SceneEntry { background: Some([1.0; 3]), ..base.clone() };
     add(Aspect::Background, "white background", white);
     list
 }
 
-fn variation(scene: &'static str, way: Way, trace: &Trace, effort: Effort) -> Result<Variation> {
-    const SAMPLES: u32 = 16;
-    let classes = PixelClasses::of(trace, SAMPLES)?;
-    let exact = replay("exact", trace, SAMPLES, 0)?.picture;
-    let mut rmse = Vec::new();
-    let mut fragments = 0;
-    for design in DESIGNS {
-        let mut squares = Vec::new();
-        for seed in 0..effort.seeds {
-            let replayed = replay(design, trace, SAMPLES, seed)?;
-            let e = errors(&replayed.picture, &exact, &classes.covered).rmse;
-            squares.push(e * e);
-        }
-        rmse.push(Estimate::of(&squares).sqrt());
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_study_files_are_those_of_the_table() {
+        let study = parse(studies::TABLE_1).unwrap();
+        assert_eq!(
+            (study.samples.as_slice(), study.designs),
+            (&COUNTS[..], DESIGNS.map(String::from).to_vec())
+        );
+        let names: Vec<&str> = study.scenes.iter().map(|s| s.name.as_str()).collect();
+        assert_eq!(names, SCENES.map(|(name, ..)| name));
+        let views = parse(studies::VIEWS).unwrap();
+        assert_eq!(views.designs, DESIGNS);
+        // Every order but its own, three angles, two sizes, white, and itself.
+        let ways: Vec<usize> = views.scenes.iter().map(|s| variations(s).len()).collect();
+        assert!(ways.iter().all(|n| *n == 10), "{ways:?}");
     }
-    for batch in trace.batches() {
-        let mask = SampleMask::first(SAMPLES);
-        let batch = batch?;
-        fragments += (0..batch.len()).filter(|i| !(batch.coverage(*i) & mask).is_empty()).count();
-    }
-    let covered = classes.covered.pixels().max(1) as f64;
-    Ok(Variation {
-        scene,
-        aspect: way.aspect,
-        what: way.what,
-        fragments_per_pixel: fragments as f64 / covered,
-        edge_share: classes.edges.pixels() as f64 / covered,
-        rmse: rmse.try_into().expect("one a design"),
-    })
 }

@@ -127,7 +127,8 @@ fn bring(into: &Store, part: &Store) -> Result<()> {
     }
     let verification = part.folder().join("verification");
     let entries = fs::read_dir(&verification).into_iter().flatten().flatten();
-    let mut files: Vec<PathBuf> = entries.map(|e| e.path()).filter(|p| !is_partial(p)).collect();
+    let mut files: Vec<PathBuf> =
+        entries.map(|e| e.path()).filter(|p| p.is_file() && !is_partial(p)).collect();
     // Documents last: where they are, all that belongs to them is.
     files.sort_by_key(|p| p.extension().is_some_and(|e| e == "md"));
     files.iter().try_for_each(|path| copy(path))?;

@@ -13,7 +13,6 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 pub use check::check;
-pub use measure::SIGMAS;
 pub use merge::{Agreed, agree};
 pub use store::{Store, read_json};
 pub use tasks::{Job, Shard, Task, jobs, tasks};
@@ -21,10 +20,11 @@ pub use tasks::{Job, Shard, Task, jobs, tasks};
 use crate::study::engine::EngineName;
 use crate::study::explained::Explained;
 use crate::study::file::Publication;
+use crate::study::measure::Reference;
 use crate::study::record::Record;
 use crate::study::results::Machine;
-use crate::study::run::measure::{Engines, measure};
-use crate::study::run::scene::{OpenScene, Reference, Watch};
+use crate::study::run::measure::{Engines, measure_job};
+use crate::study::run::scene::{OpenScene, Watch};
 use screendoor_rop::{ExplainLimits, Site};
 use screendoor_trace::error::{Error, Result, panic_text};
 use screendoor_trace::picture::{Layer, Picture, write_exr};
@@ -126,8 +126,8 @@ impl Runner<'_> {
     ) -> std::result::Result<(), Failure> {
         let (scene, reference) = open.at(self, job, watch)?;
         let study = self.store.study();
-        let (record, picture) =
-            measure(study, engines, scene, reference, job, watch).map_err(Failure::Run)?;
+        let (record, picture) = measure_job(study, engines, &scene.subject, reference, job, watch)
+            .map_err(Failure::Run)?;
         if study.pictures.contains(&job.samples) {
             self.keep(job, scene, &picture, &reference.picture)?;
         }
@@ -150,7 +150,7 @@ impl Runner<'_> {
         let study = self.store.study();
         let design = study.design(&job.series, job.samples)?;
         let [x, y] = scene.facts.pixel;
-        let trace = (&scene.trace, scene.facts.trace.as_str());
+        let trace = (&scene.subject.trace, scene.facts.trace.as_str());
         let site = Site { x, y };
         let limits = ExplainLimits { memory: study.memory << 20, ..ExplainLimits::default() };
         let seed = study.first_seed;
@@ -234,7 +234,7 @@ impl Open {
             Some(reference) => reference,
             None => {
                 watch(&format!("exact at {} on {}", job.samples, scene.facts.name));
-                Reference::of(store, scene, job.samples)?
+                Reference::of(&scene.subject, job.samples, &store.study().metrics)?
             }
         };
         Ok((scene, self.reference.insert(reference)))

@@ -2,35 +2,27 @@
 
 use std::path::Path;
 
-use crate::metrics::{Flip, PixelClasses, Region};
-use crate::study::file::{Metric, SceneEntry, Study};
+use crate::study::file::SceneEntry;
+use crate::study::measure::Subject;
 use crate::study::results::SceneFacts;
 use crate::study::run::store::Store;
-use crate::study::throughput::work;
-use screendoor_designs::{REFERENCE, configure};
+use screendoor_designs::REFERENCE;
 use screendoor_scene::capture::Capture;
 use screendoor_scene::scene;
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::output::OutputFile;
-use screendoor_trace::picture::Picture;
 use screendoor_trace::tile::{TILE_PIXELS, TileGrid, TileMap};
-use screendoor_trace::trace::{
-    Trace, TraceWriter, WriteOptions, statistics_within, tied_fragments_within,
-};
+use screendoor_trace::trace::{Trace, TraceWriter, WriteOptions, statistics_within};
 
 /// What runs are told of.
 pub type Watch<'a> = &'a (dyn Fn(&str) + Sync);
 
 /// A scene that is being measured.
 pub(super) struct OpenScene {
-    /// Its trace.
-    pub trace: Trace,
+    /// Its trace, with what all runs share.
+    pub subject: Subject,
     /// What is told of it.
     pub facts: SceneFacts,
-    /// The exact picture of all samples.
-    pub fine: Picture,
-    /// The pixels that fragments cover, of all samples.
-    pub fine_covered: Region,
 }
 
 impl OpenScene {
@@ -65,15 +57,11 @@ impl OpenScene {
         let facts = facts(store, index, &trace, shown, warnings, watch)?;
         let all = trace.header().pattern.samples();
         watch(&format!("{REFERENCE} at {all} on {}", entry.name));
-        let fine = exact(store.study(), &trace, all)?;
-        let fine_covered = PixelClasses::of(&trace, all)?.covered;
-        Ok(OpenScene { trace, facts, fine, fine_covered })
+        let known = (facts.content.clone(), facts.statistics.tied_fragments);
+        let memory = store.study().memory << 20;
+        let subject = Subject::new(&facts.name, trace, Some(known), memory)?;
+        Ok(OpenScene { subject, facts })
     }
-}
-
-fn exact(study: &Study, trace: &Trace, samples: u32) -> Result<Picture> {
-    let design = configure(REFERENCE, &[])?;
-    Ok(design.replay(trace, samples, 0, &study.replay_options())?.picture)
 }
 
 /// Draws a scene into the trace at `path`. Returns what of it is not drawn.
@@ -181,51 +169,4 @@ fn telling_pixel(trace: &Trace) -> Result<[u16; 2]> {
         }
     }
     Ok(best.2.map(|c| c as u16))
-}
-
-/// What all runs at one sample count of a scene share.
-pub(super) struct Reference {
-    pub samples: u32,
-    /// The exact picture of the same samples.
-    pub picture: Picture,
-    pub frame: Region,
-    pub classes: PixelClasses,
-    /// Fragments that cover one of the samples.
-    pub fragments: u64,
-    /// Those of them that share a depth with another at one of the samples.
-    pub tied_fragments: u64,
-    /// Comparison to the picture as a viewer sees it, where it is asked for.
-    pub flip: Option<Flip>,
-}
-
-impl Reference {
-    /// Makes it.
-    ///
-    /// # Errors
-    /// As [`screendoor_designs::Configured::replay`].
-    pub fn of(store: &Store, scene: &OpenScene, samples: u32) -> Result<Self> {
-        let study = store.study();
-        let trace = &scene.trace;
-        trace.header().pattern.prefix(samples)?;
-        let picture = if samples == trace.header().pattern.samples() {
-            scene.fine.clone()
-        } else {
-            exact(study, trace, samples)?
-        };
-        let seen = [Metric::Flip, Metric::FlipHdr].iter().any(|m| study.takes(*m));
-        Ok(Reference {
-            samples,
-            frame: Region::frame(picture.grid()),
-            classes: PixelClasses::of(trace, samples)?,
-            fragments: work(trace, samples)?.fragments,
-            // What no two share at all samples they do not at some.
-            tied_fragments: match scene.facts.statistics.tied_fragments {
-                0 => 0,
-                all if samples == trace.header().pattern.samples() => all,
-                _ => tied_fragments_within(trace, samples, study.memory << 20)?,
-            },
-            flip: seen.then(|| Flip::new(&picture)),
-            picture,
-        })
-    }
 }

@@ -8,7 +8,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use crate::study::file::{Publication, Study};
-use crate::study::record::Record;
+use crate::study::record::{Record, check_version};
 use crate::study::results::{Machine, Missing, Results, SceneFacts};
 use crate::study::run::tasks::{Job, jobs};
 use screendoor_trace::error::{Error, Result};
@@ -170,6 +170,11 @@ impl Store {
     /// A file of what publications print beside what is measured.
     pub fn verification_file(&self, name: &str) -> PathBuf {
         self.folder.join("verification").join(name)
+    }
+
+    /// Where a publication's own studies are measured.
+    pub fn publication_folder(&self, publication: Publication) -> PathBuf {
+        self.verification_file(publication.name())
     }
 
     /// A publication's document, written last of what belongs to it.
@@ -439,6 +444,7 @@ struct Sealed<'a, T> {
 }
 
 const CHECKSUM: &str = "checksum";
+const VERSION: &str = "version";
 
 /// The BLAKE3 of a JSON object's text, whatever its spaces.
 fn checksum(text: &str) -> serde_json::Result<String> {
@@ -450,7 +456,7 @@ fn checksum(text: &str) -> serde_json::Result<String> {
 ///
 /// # Errors
 /// As [`read_json`]; [`Error::Invalid`] where it bears no checksum or another one than its
-/// text has.
+/// text has, and where a later version wrote it.
 fn read_sealed<T: DeserializeOwned>(path: &Path) -> Result<Option<T>> {
     use serde_json::{Map, Value};
     let Some(mut fields) = read_json::<Map<String, Value>>(path)? else { return Ok(None) };
@@ -462,6 +468,11 @@ fn read_sealed<T: DeserializeOwned>(path: &Path) -> Result<Option<T>> {
     if checksum(&text).map_err(bad)? != written {
         return Err(damaged(path, "it was changed after it was written: its checksum differs"));
     }
+    // Before its fields, of which a later version may have others.
+    if let Some(Err(what)) = fields.get(VERSION).and_then(Value::as_u64).map(check_version) {
+        let hint = "read it with that screendoor, or measure into another folder";
+        return Err(Error::invalid(path.display(), what, hint));
+    }
     serde_json::from_str(&text).map(Some).map_err(bad)
 }
 
@@ -472,4 +483,46 @@ fn damaged(path: &Path, what: &str) -> Error {
         "remove it to have it measured again, or begin in another folder where another version \
          of this program wrote this one",
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::analysis::made_up;
+    use serde_json::{Map, Value};
+
+    /// A record's fields in a file of a folder, read again.
+    fn reread(change: impl FnOnce(&mut Map<String, Value>)) -> Result<Option<Record>> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.json");
+        let record = made_up::record("a", "lk", 8, made_up::exactly(1.5));
+        let Value::Object(mut fields) = serde_json::to_value(&record).unwrap() else { panic!() };
+        change(&mut fields);
+        Store::put_sealed(&path, &fields).unwrap();
+        read_sealed(&path)
+    }
+
+    #[test]
+    fn records_of_older_folders_are_read_and_those_of_later_versions_refused_as_such() {
+        let today = reread(|fields| assert!(!fields.contains_key(VERSION))).unwrap().unwrap();
+        assert_eq!(today, made_up::record("a", "lk", 8, made_up::exactly(1.5)));
+        // What was not measured then is not there.
+        let older = reread(|fields| {
+            for metric in ["filtered", "flip", "flip_hdr", "spectrum"] {
+                assert!(fields.remove(metric).is_some(), "{metric}");
+            }
+        });
+        let older = older.unwrap().unwrap();
+        assert_eq!((older.filtered.len(), older.flip, older.spectrum), (0, None, None));
+        assert_eq!(older.covered, today.covered);
+        let later = reread(|fields| {
+            fields.insert(VERSION.into(), 7.into());
+            fields.insert("of_tomorrow".into(), 1.into());
+        });
+        let said = later.unwrap_err().to_string();
+        assert!(said.contains("record of version 7") && said.contains("up to version 1"), "{said}");
+        // What makes a run what it is has no default.
+        assert!(reread(|fields| drop(fields.remove("covered"))).is_err());
+        assert!(reread(|fields| drop(fields.insert("of_tomorrow".into(), 1.into()))).is_err());
+    }
 }

@@ -24,7 +24,8 @@ pub use faults::Fault;
 pub use judge::{DECIDED, Outcome, SIGNIFICANCE, Tally};
 pub use unfit::Unfit;
 
-use crate::study::engine::EngineName;
+use crate::study::engine::{EngineName, FAST};
+use crate::study::measure::replays;
 use crate::study::stress::judge::Judge;
 use screendoor_designs::{Configured, DESIGNS, configure};
 use screendoor_gpu::{self as gpu, Gpu, GpuOptions, TOLERANCE};
@@ -328,7 +329,9 @@ impl Trial<'_> {
             true => self.seeds.min(HEAVY_SEEDS),
             false => 1,
         };
-        let rest = (1..seeds).map(|seed| self.picture(design, Which::Fast, seed));
+        let (trace, samples) = (&self.trace, self.case.samples);
+        let rest = replays(FAST, design, trace, samples, 1..seeds, ReplayOptions::default());
+        let rest = rest.map(|seed| Ok(seed?.replayed.picture));
         match std::iter::once(Ok(first)).chain(rest).collect::<Result<Vec<_>>>() {
             Ok(pictures) => self.judge.outcome(&pictures),
             Err(e) => refused(&e),

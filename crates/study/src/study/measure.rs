@@ -1,0 +1,491 @@
+//! The one way to measure: a design's seeds on a trace at a sample count become a [`Record`].
+//!
+//! A [`Subject`] is a trace with what all its runs share, a [`Reference`] adds what those at
+//! one sample count share; [`measure`] does one run. Whoever looks at pictures otherwise, as
+//! the publications' figures do, takes them from [`replays`], the one loop over seeds.
+
+use std::borrow::Borrow;
+use std::ops::Range;
+use std::time::Instant;
+
+use rayon::prelude::*;
+
+use crate::metrics::{
+    Ensemble, EnsembleErrors, Estimate, Flip, FlipFigures, PixelClasses, Region, Spectrum, errors,
+    filtered_rmse,
+};
+use crate::study::engine::{Engine, FAST, OnGpu};
+use crate::study::file::Metric;
+use crate::study::record::{Filtered, FlipOverSeeds, Record, SpectrumOverSeeds, VERSION};
+use crate::study::throughput::work;
+use screendoor_designs::{Configured, REFERENCE, configure};
+use screendoor_rop::{EventCounts, ReplayOptions, Replayed, StateBits};
+use screendoor_trace::error::Result;
+use screendoor_trace::param::Options;
+use screendoor_trace::picture::Picture;
+use screendoor_trace::tile::TileGrid;
+use screendoor_trace::trace::{Trace, tied_fragments_within};
+
+/// Standard deviations of the Gaussians that stand for a viewer further away, in pixels.
+pub const SIGMAS: [f64; 2] = [1.0, 2.0];
+
+/// Side of the square blocks of [`Metric::Blocks`], in pixels.
+pub const BLOCK: u32 = 4;
+
+/// A trace that designs are measured on, with what all runs on it share.
+pub struct Subject {
+    /// The scene's name.
+    pub name: String,
+    /// The trace.
+    pub trace: Trace,
+    /// BLAKE3 of the trace's content.
+    content: String,
+    /// Its fragments that share a depth with another one at any sample.
+    tied_fragments: u64,
+    /// The exact picture of all samples.
+    fine: Picture,
+    /// The pixels that fragments cover, of all samples.
+    fine_covered: Region,
+    /// Bytes that the state of a design may take that grows with the fragments.
+    memory: u64,
+}
+
+impl Subject {
+    /// A scene's trace; its content's hash and its tied fragments where they are known.
+    ///
+    /// # Errors
+    /// As [`Configured::replay`] and [`Trace::verify`].
+    pub fn new(
+        name: &str,
+        trace: Trace,
+        known: Option<(String, u64)>,
+        memory: u64,
+    ) -> Result<Self> {
+        let all = trace.header().pattern.samples();
+        let (content, tied_fragments) = match known {
+            Some(known) => known,
+            None => {
+                let content = trace.content().map(ToString::to_string);
+                let content = content.map_or_else(|| trace.verify(|_| ()), Ok)?;
+                (content, tied_fragments_within(&trace, all, memory)?)
+            }
+        };
+        let fine = exact(&trace, all, memory)?;
+        let fine_covered = PixelClasses::of(&trace, all)?.covered;
+        let name = name.to_string();
+        Ok(Subject { name, trace, content, tied_fragments, fine, fine_covered, memory })
+    }
+
+    fn options(&self) -> ReplayOptions<'static> {
+        ReplayOptions { memory: self.memory, ..ReplayOptions::default() }
+    }
+}
+
+fn exact(trace: &Trace, samples: u32, memory: u64) -> Result<Picture> {
+    let options = ReplayOptions { memory, ..ReplayOptions::default() };
+    Ok(configure(REFERENCE, &[])?.replay(trace, samples, 0, &options)?.picture)
+}
+
+/// What all runs at one sample count of a subject share.
+pub struct Reference {
+    /// Samples per pixel.
+    pub samples: u32,
+    /// The exact picture of the same samples.
+    pub picture: Picture,
+    frame: Region,
+    classes: PixelClasses,
+    /// Fragments that cover one of the samples.
+    fragments: u64,
+    /// Those of them that share a depth with another at one of the samples.
+    tied_fragments: u64,
+    /// Comparison to the picture as a viewer sees it, where it is asked for.
+    flip: Option<Flip>,
+    /// The picture averaged over blocks, and its frame, where it is asked for.
+    blocks: Option<(Picture, Region)>,
+}
+
+impl Reference {
+    /// Makes it, with what `metrics` need.
+    ///
+    /// # Errors
+    /// As [`Configured::replay`].
+    pub fn of(subject: &Subject, samples: u32, metrics: &[Metric]) -> Result<Self> {
+        let trace = &subject.trace;
+        trace.header().pattern.prefix(samples)?;
+        let is_all = samples == trace.header().pattern.samples();
+        let picture = match is_all {
+            true => subject.fine.clone(),
+            false => exact(trace, samples, subject.memory)?,
+        };
+        let seen = [Metric::Flip, Metric::FlipHdr].iter().any(|m| metrics.contains(m));
+        let blocks = metrics.contains(&Metric::Blocks).then(|| averaged(&picture, BLOCK));
+        Ok(Reference {
+            samples,
+            frame: Region::frame(picture.grid()),
+            classes: PixelClasses::of(trace, samples)?,
+            fragments: work(trace, samples)?.fragments,
+            // What no two share at all samples they do not at some.
+            tied_fragments: match subject.tied_fragments {
+                0 => 0,
+                all if is_all => all,
+                _ => tied_fragments_within(trace, samples, subject.memory)?,
+            },
+            flip: seen.then(|| Flip::new(&picture)),
+            blocks: blocks.map(|blocks| {
+                let frame = Region::frame(blocks.grid());
+                (blocks, frame)
+            }),
+            picture,
+        })
+    }
+}
+
+/// The picture averaged over blocks of `side` × `side` pixels; what is left of it at the right
+/// and at the bottom is no block.
+pub fn averaged(picture: &Picture, side: u32) -> Picture {
+    let grid = TileGrid::new(picture.width() / side, picture.height() / side);
+    Picture::from_fn(grid, |x, y| {
+        let mut sum = [0.0; 3];
+        for (dx, dy) in (0..side).flat_map(|dy| (0..side).map(move |dx| (dx, dy))) {
+            let colour = picture.get(x * side + dx, y * side + dy);
+            sum.iter_mut().zip(colour).for_each(|(s, c)| *s += c);
+        }
+        sum.map(|s| s / f64::from(side * side))
+    })
+}
+
+/// One seed's replay.
+#[derive(Debug)]
+pub struct OneSeed {
+    /// What it gave.
+    pub replayed: Replayed,
+    /// What a GPU says of it.
+    pub gpu: Option<OnGpu>,
+    /// How long it took.
+    pub seconds: f64,
+}
+
+/// A design's replays, seed after seed. Counting costs time: where it is asked for, only the
+/// first seed's replay counts.
+///
+/// # Errors
+/// As [`Engine::replay`], for each seed.
+pub fn replays<'a>(
+    engine: &'a Engine,
+    design: impl Borrow<Configured> + 'a,
+    trace: &'a Trace,
+    samples: u32,
+    seeds: impl IntoIterator<Item = u32, IntoIter: 'a>,
+    options: ReplayOptions<'a>,
+) -> impl Iterator<Item = Result<OneSeed>> + 'a {
+    seeds.into_iter().enumerate().map(move |(place, seed)| {
+        let count_events = options.count_events && place == 0;
+        let start = Instant::now();
+        let options = ReplayOptions { count_events, ..options };
+        let (replayed, gpu) = engine.replay(design.borrow(), trace, samples, seed, &options)?;
+        Ok(OneSeed { replayed, gpu, seconds: start.elapsed().as_secs_f64() })
+    })
+}
+
+/// How a run is measured.
+#[derive(Clone)]
+pub struct Setup<'a> {
+    /// What draws.
+    pub engine: &'a Engine,
+    /// The seeds; of a design that has none the first alone is replayed.
+    pub seeds: Range<u32>,
+    /// Metrics beyond the errors.
+    pub metrics: &'a [Metric],
+}
+
+/// A run that was measured.
+#[derive(Clone, Debug)]
+pub struct Measured {
+    /// What it says, without [`Record::speed`]; as series and as its id it has the design's
+    /// label.
+    pub record: Record,
+    /// The picture of the first seed.
+    pub picture: Picture,
+    /// Seconds of each replay that counted nothing: of all seeds but the first, or of that
+    /// where it is the only one.
+    pub seconds: Vec<f64>,
+}
+
+/// Measures a design on a subject, at the reference's sample count.
+///
+/// # Errors
+/// As [`Engine::replay`].
+pub fn measure(
+    subject: &Subject,
+    reference: &Reference,
+    design: &Configured,
+    setup: &Setup<'_>,
+) -> Result<Measured> {
+    let promises = design.promises();
+    let Range { start, end } = setup.seeds;
+    let seeds = if promises.seeded { start..end } else { start..start + 1 };
+    let run = Run { subject, reference, design, setup };
+    let count = seeds.len() as u32;
+    let Looked { seen, ensemble, first, counted, seconds } = run.over(seeds)?;
+    let [frame, covered, interior, edges] = ensemble;
+    let over = |of: &dyn Fn(&Seen) -> f64| Estimate::of(&seen.iter().map(of).collect::<Vec<_>>());
+    let sigmas = seen.first().map_or(0, |s| s.filtered_squares.len());
+    let filtered = SIGMAS[..sigmas].iter().enumerate().map(|(i, sigma)| Filtered {
+        sigma: *sigma,
+        rmse: over(&|s| s.filtered_squares[i]).sqrt(),
+    });
+    let blocks: Option<Vec<f64>> = seen.iter().map(|s| s.blocks_square).collect();
+    let record = Record {
+        version: VERSION,
+        id: design.label(),
+        scene: subject.name.clone(),
+        trace: subject.content.clone(),
+        series: design.label(),
+        design: design.label(),
+        family: design.info().family.name().to_string(),
+        promises: promises.into(),
+        samples: reference.samples,
+        seeds: count,
+        fragments: reference.fragments,
+        tied_fragments: reference.tied_fragments,
+        frame,
+        covered,
+        interior,
+        edges,
+        fine: over(&|s| s.fine_square).sqrt(),
+        filtered: filtered.collect(),
+        flip: flip(&seen, |s| s.flip),
+        flip_hdr: flip(&seen, |s| s.flip_hdr),
+        spectrum: spectrum(&seen),
+        blocks: blocks.map(|squares| Estimate::of(&squares).sqrt()),
+        events: counted.events,
+        state_bits: counted.state_bits,
+        layout: counted.layout,
+        passes: counted.passes,
+        touched_tiles: counted.touched_tiles as u64,
+        picture: first.hash(),
+        speed: Default::default(),
+    };
+    Ok(Measured { record, picture: first, seconds })
+}
+
+/// What is measured, on what and how.
+struct Run<'a> {
+    subject: &'a Subject,
+    reference: &'a Reference,
+    design: &'a Configured,
+    setup: &'a Setup<'a>,
+}
+
+/// What a replay tells beside its picture.
+struct Counted {
+    events: EventCounts,
+    state_bits: StateBits,
+    layout: String,
+    passes: u32,
+    touched_tiles: usize,
+}
+
+impl Counted {
+    /// `None` where no events were counted.
+    fn of(replayed: &Replayed) -> Option<Self> {
+        Some(Counted {
+            events: replayed.events.clone()?,
+            state_bits: replayed.state_bits,
+            layout: replayed.layout.to_string(),
+            passes: replayed.passes,
+            touched_tiles: replayed.touched_tiles,
+        })
+    }
+}
+
+/// What is seen of one seed's picture.
+struct Seen {
+    fine_square: f64,
+    filtered_squares: Vec<f64>,
+    flip: Option<FlipFigures>,
+    flip_hdr: Option<FlipFigures>,
+    spectrum: Option<Spectrum>,
+    blocks_square: Option<f64>,
+}
+
+/// What came of looking at all seeds.
+struct Looked {
+    seen: Vec<Seen>,
+    ensemble: [EnsembleErrors; 4],
+    /// The first seed's picture.
+    first: Picture,
+    counted: Counted,
+    seconds: Vec<f64>,
+}
+
+impl Run<'_> {
+    fn replays<'a>(
+        &'a self,
+        engine: &'a Engine,
+        seeds: Range<u32>,
+    ) -> impl Iterator<Item = Result<OneSeed>> + 'a {
+        let options = ReplayOptions { count_events: true, ..self.subject.options() };
+        let (trace, samples) = (&self.subject.trace, self.reference.samples);
+        replays(engine, self.design, trace, samples, seeds, options)
+    }
+
+    /// What a replay of the first seed counts where the engine's own has counted nothing, as
+    /// GPUs do not: the processor's fast engine does, and draws the same.
+    fn counted(&self, seed: u32) -> Result<Counted> {
+        let again = self.replays(FAST, seed..seed + 1).next();
+        let again = again.expect("there is one seed")?.replayed;
+        Ok(Counted::of(&again).expect("it was asked to count"))
+    }
+
+    /// Replays all seeds; a batch's pictures are looked at side by side.
+    fn over(&self, seeds: Range<u32>) -> Result<Looked> {
+        let reference = self.reference;
+        let classes = &reference.classes;
+        let regions = [&reference.frame, &classes.covered, &classes.interior, &classes.edges];
+        let mut ensemble = Ensemble::new(&reference.picture, &regions);
+        let start = seeds.start;
+        let mut replays = self.replays(self.setup.engine, seeds);
+        let first = replays.next().expect("a run has a seed")?;
+        let counted = match Counted::of(&first.replayed) {
+            Some(counted) => counted,
+            None => self.counted(start)?,
+        };
+        let alone = first.seconds;
+        let first = first.replayed.picture;
+        let (mut seen, mut seconds) = (Vec::new(), Vec::new());
+        let batch = rayon::current_num_threads().max(1);
+        let mut pictures = vec![first.clone()];
+        loop {
+            for seed in replays.by_ref().take(batch - pictures.len()) {
+                let seed = seed?;
+                seconds.push(seed.seconds);
+                pictures.push(seed.replayed.picture);
+            }
+            if pictures.is_empty() {
+                break;
+            }
+            pictures.iter().for_each(|picture| ensemble.add(picture));
+            seen.par_extend(pictures.par_iter().map(|picture| self.see(picture)));
+            pictures.clear();
+        }
+        if seconds.is_empty() {
+            seconds.push(alone);
+        }
+        let ensemble = ensemble.finish().try_into().expect("one for each region");
+        Ok(Looked { seen, ensemble, first, counted, seconds })
+    }
+
+    fn see(&self, picture: &Picture) -> Seen {
+        let reference = self.reference;
+        let takes = |metric| self.setup.metrics.contains(&metric);
+        let fine = errors(picture, &self.subject.fine, &self.subject.fine_covered).rmse;
+        let filtered = |sigma: &f64| {
+            filtered_rmse(picture, &reference.picture, *sigma, &reference.classes.covered).powi(2)
+        };
+        let sigmas: &[f64] = if takes(Metric::Filtered) { &SIGMAS } else { &[] };
+        let flip = |metric| reference.flip.as_ref().filter(|_| takes(metric));
+        let blocks = reference.blocks.as_ref().filter(|_| takes(Metric::Blocks));
+        Seen {
+            fine_square: fine * fine,
+            filtered_squares: sigmas.iter().map(filtered).collect(),
+            flip: flip(Metric::Flip).map(|f| f.ldr(picture).figures()),
+            flip_hdr: flip(Metric::FlipHdr).map(|f| f.hdr(picture).figures()),
+            spectrum: takes(Metric::Spectrum).then(|| Spectrum::of(picture, &reference.picture)),
+            blocks_square: blocks
+                .map(|(exact, frame)| errors(&averaged(picture, BLOCK), exact, frame).rmse.powi(2)),
+        }
+    }
+}
+
+fn flip(seen: &[Seen], of: impl Fn(&Seen) -> Option<FlipFigures>) -> Option<FlipOverSeeds> {
+    let all: Vec<FlipFigures> = seen.iter().map(of).collect::<Option<_>>()?;
+    let over = |value: &dyn Fn(&FlipFigures) -> f64| {
+        Estimate::of(&all.iter().map(value).collect::<Vec<_>>())
+    };
+    Some(FlipOverSeeds {
+        mean: over(&|f| f.mean),
+        quartiles: [0, 1, 2].map(|i| over(&|f| f.quartiles[i])),
+    })
+}
+
+fn spectrum(seen: &[Seen]) -> Option<SpectrumOverSeeds> {
+    let all: Vec<Spectrum> = seen.iter().map(|s| s.spectrum.clone()).collect::<Option<_>>()?;
+    let mean = Spectrum::mean(&all)?;
+    let blueness: Option<Vec<f64>> = all.iter().map(Spectrum::blueness).collect();
+    Some(SpectrumOverSeeds {
+        frequency: mean.frequency,
+        power: mean.power,
+        blueness: blueness.map(|b| Estimate::of(&b)),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use screendoor_scene::capture::{Capture, CaptureOptions};
+    use screendoor_scene::scene;
+
+    fn subject() -> Subject {
+        let options =
+            CaptureOptions { width: 24, height: 20, samples: 8, ..CaptureOptions::default() };
+        let scene = scene::load("builtin:cloth").unwrap();
+        let trace = Capture::new(&scene, &options).unwrap().to_memory(|_, _| ()).unwrap();
+        Subject::new("cloth", trace, None, 1 << 28).unwrap()
+    }
+
+    #[test]
+    fn a_record_says_what_was_measured_and_is_the_same_again() {
+        let subject = subject();
+        let metrics = [Metric::Blocks, Metric::Filtered];
+        let reference = Reference::of(&subject, 4, &metrics).unwrap();
+        let of = |design: &str, seeds: Range<u32>, metrics: &[Metric]| {
+            let setup = Setup { engine: FAST, seeds, metrics };
+            measure(&subject, &reference, &configure(design, &[]).unwrap(), &setup).unwrap()
+        };
+        let found = of("enderton", 0..3, &metrics);
+        assert_eq!(of("enderton", 0..3, &metrics).record, found.record);
+        let record = &found.record;
+        assert_eq!((record.samples, record.seeds, record.scene.as_str()), (4, 3, "cloth"));
+        assert_eq!((record.covered.seeds, found.seconds.len()), (3, 2));
+        assert_eq!(record.picture, found.picture.hash());
+        assert!(record.events.fragments > 0 && record.fragments > 0);
+        // Noise averages out over blocks, and over a Gaussian.
+        let rmse = record.frame.rmse.value;
+        assert!(rmse > 1.0 && record.blocks.unwrap().value < rmse / 2.0, "{record:?}");
+        assert!(record.filtered[0].rmse.value < record.covered.rmse.value);
+        // The first seed is the one that is asked for.
+        assert_ne!(of("enderton", 1..3, &[]).record.picture, record.picture);
+        // What has no seeds is replayed once, and what was not asked for is not there.
+        let exact = of("exact", 0..3, &[]);
+        assert_eq!((exact.record.seeds, exact.seconds.len()), (1, 1));
+        assert_eq!((exact.record.covered.rmse.value, exact.record.blocks), (0.0, None));
+        // Of all samples the picture of four is not the exact one.
+        assert!(exact.record.fine.value > 0.0);
+    }
+
+    #[test]
+    fn replays_go_through_the_seeds_and_count_in_the_first() {
+        let subject = subject();
+        let design = configure("lk", &[]).unwrap();
+        let options = ReplayOptions { count_events: true, ..subject.options() };
+        let found: Vec<OneSeed> = replays(FAST, &design, &subject.trace, 4, 5..8, options)
+            .collect::<Result<_>>()
+            .unwrap();
+        let counted: Vec<bool> = found.iter().map(|s| s.replayed.events.is_some()).collect();
+        assert_eq!(counted, [true, false, false]);
+        for (seed, one) in (5..).zip(&found) {
+            let alone = design.replay(&subject.trace, 4, seed, &subject.options()).unwrap();
+            assert_eq!(alone.picture.hash(), one.replayed.picture.hash());
+        }
+    }
+
+    #[test]
+    fn blocks_are_means_of_their_pixels() {
+        let picture = Picture::from_fn(TileGrid::new(9, 8), |x, y| [f64::from(x + 10 * y); 3]);
+        let blocks = averaged(&picture, 4);
+        assert_eq!((blocks.width(), blocks.height()), (2, 2));
+        assert_eq!(blocks.get(0, 0), [16.5; 3]);
+        assert_eq!(blocks.get(1, 1), [60.5; 3]);
+    }
+}
