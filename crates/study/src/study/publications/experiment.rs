@@ -251,7 +251,7 @@ impl Quiet {
     }
 }
 
-#[cfg(any(test, feature = "made-up"))]
+#[cfg(test)]
 mod tests {
     use super::*;
 
