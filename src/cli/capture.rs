@@ -173,7 +173,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         None => (told.record(&Capture::new(&scene, &options)?, write, file, console)?, None),
         Some(gpu) => {
             let capture = GpuCapture::new(gpu, &scene, &options)?;
-            let recorded = told.record_by_gpu(&capture, write, file, console)?;
+            let recorded = told.record(&capture, write, file, console)?;
             let found = arguments.check.then(|| cross_check(&capture, console)).transpose()?;
             (recorded, found)
         }
@@ -218,8 +218,41 @@ pub(super) fn record(
     told.record(&Capture::new(scene, options)?, write, file, console).map(|(written, _)| written)
 }
 
-type Writer = TraceWriter<OutputFile>;
-type Progress<'a> = &'a mut (dyn FnMut(u64, u64) + Send);
+/// What a trace is recorded from: our own rasteriser or a GPU's.
+trait Recording {
+    fn header(&self) -> &Header;
+    fn draw(
+        &self,
+        writer: &mut TraceWriter<OutputFile>,
+        progress: &mut (dyn FnMut(u64, u64) + Send),
+    ) -> Result<()>;
+    fn unseen(&self) -> Vec<Unseen>;
+}
+
+/// By what a rasteriser has of its own.
+macro_rules! recording {
+    ($($kind:ident),*) => {$(
+        impl Recording for $kind<'_> {
+            fn header(&self) -> &Header {
+                self.header()
+            }
+
+            fn draw(
+                &self,
+                writer: &mut TraceWriter<OutputFile>,
+                progress: &mut (dyn FnMut(u64, u64) + Send),
+            ) -> Result<()> {
+                self.draw(writer, progress)
+            }
+
+            fn unseen(&self) -> Vec<Unseen> {
+                self.unseen()
+            }
+        }
+    )*};
+}
+
+recording!(Capture, GpuCapture);
 
 /// The most objects without fragments that are listed one by one.
 const MOST_UNSEEN: usize = 20;
@@ -237,45 +270,23 @@ struct Told<'a> {
 type Recorded = (Written, Vec<Unseen>);
 
 impl Told<'_> {
+    /// Writes what `capture` draws.
     fn record(
         &self,
-        capture: &Capture<'_>,
-        write: WriteOptions,
-        file: OutputFile,
-        console: &Console,
-    ) -> Result<Recorded> {
-        let draw = |writer: &mut Writer, told: Progress<'_>| capture.draw(writer, told);
-        self.write(capture.header(), draw, || capture.unseen(), write, file, console)
-    }
-
-    fn record_by_gpu(
-        &self,
-        capture: &GpuCapture<'_>,
-        write: WriteOptions,
-        file: OutputFile,
-        console: &Console,
-    ) -> Result<Recorded> {
-        let draw = |writer: &mut Writer, told: Progress<'_>| capture.draw(writer, told);
-        self.write(capture.header(), draw, || capture.unseen(), write, file, console)
-    }
-
-    fn write(
-        &self,
-        header: &Header,
-        draw: impl FnOnce(&mut Writer, Progress<'_>) -> Result<()>,
-        unseen: impl FnOnce() -> Vec<Unseen>,
+        capture: &impl Recording,
         options: WriteOptions,
         file: OutputFile,
         console: &Console,
     ) -> Result<Recorded> {
+        let header = capture.header();
         self.warn(&self.scene.warnings, console)?;
         let place = file.path().display().to_string();
         let mut writer = TraceWriter::new(file, &place, header.clone(), options)?;
         let progress = console.progress("capturing", "triangles");
-        draw(&mut writer, &mut |done, total| progress.set(done, total))?;
+        capture.draw(&mut writer, &mut |done, total| progress.set(done, total))?;
         drop(progress);
         let (file, written) = writer.finish()?;
-        let unseen = if self.unseen { unseen() } else { Vec::new() };
+        let unseen = if self.unseen { capture.unseen() } else { Vec::new() };
         let mut warnings: Vec<String> =
             unseen.iter().take(MOST_UNSEEN).map(Unseen::to_string).collect();
         if let Some(more) = unseen.len().checked_sub(MOST_UNSEEN + 1) {

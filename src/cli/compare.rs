@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use crate::cli::console::Console;
-use crate::cli::files::{JsonArgument, check, report};
+use crate::cli::files::{JsonArgument, check, report, write_picture};
 use crate::cli::kind::{Kind, check_input};
 use crate::error::{Error, Result};
 use crate::metrics::{Errors, Region, errors};
@@ -79,7 +79,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let identical = same_colours && same_alpha && windows[0] == windows[1];
     let saved = output.map_or(Ok(()), |mut file| {
         let difference = a.minus(&b);
-        file.write(&[Layer { name: "error", picture: &difference }])?;
+        write_picture(&mut file, &[Layer { name: "error", picture: &difference }], console)?;
         file.commit()
     });
     let document = Document {

@@ -106,7 +106,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     if let Some(comparison) = comparison(&measured.runs) {
         say(format_args!("\n{comparison}"));
     }
-    let saved = save(files, &measured);
+    let saved = save(files, &measured, console);
     if saved.is_ok() {
         say(format_args!(
             "\npictures are in {0}/ (.png to look at, .exr with the layers colour, reference and \
@@ -151,14 +151,14 @@ fn picture_paths(folder: &Path, designs: &[Configured]) -> Vec<PathBuf> {
 }
 
 /// Writes the pictures, in the order of [`picture_paths`].
-fn save(mut files: Vec<PictureFile>, measured: &Measurements) -> Result<()> {
+fn save(mut files: Vec<PictureFile>, measured: &Measurements, console: &Console) -> Result<()> {
     let mut rest = files.chunks_mut(2);
     for (m, pair) in measured.runs.iter().zip(rest.by_ref()) {
         let at = SAMPLES.iter().position(|s| *s == m.run.samples).expect("a sample count of ours");
-        write_pictures(pair, &m.picture, Some(&measured.references[at]))?;
+        write_pictures(pair, &m.picture, Some(&measured.references[at]), console)?;
     }
     if let (Some(exact), Some(reference)) = (rest.next(), measured.references.last()) {
-        write_pictures(exact, reference, None)?;
+        write_pictures(exact, reference, None, console)?;
     }
     files.into_iter().try_for_each(PictureFile::commit)
 }

@@ -62,6 +62,7 @@ pub(super) fn write_pictures(
     files: &mut [PictureFile],
     picture: &Picture,
     reference: Option<&Picture>,
+    console: &Console,
 ) -> Result<()> {
     let error = reference.map(|reference| picture.minus(reference));
     let mut layers = vec![Layer { name: "colour", picture }];
@@ -69,7 +70,17 @@ pub(super) fn write_pictures(
         layers.push(Layer { name: "reference", picture: reference });
         layers.push(Layer { name: "error", picture: error });
     }
-    files.iter_mut().try_for_each(|file| file.write(&layers))
+    files.iter_mut().try_for_each(|file| write_picture(file, &layers, console))
+}
+
+/// Writes the layers of one picture, with a sign of life.
+pub(super) fn write_picture(
+    file: &mut PictureFile,
+    layers: &[Layer<'_>],
+    console: &Console,
+) -> Result<()> {
+    let progress = console.progress("writing the picture", "blocks");
+    file.write(layers, &mut |done, total| progress.set(done, total))
 }
 
 /// Opens a trace; warns of one without checksums. What is plainly something else is refused

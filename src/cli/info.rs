@@ -7,13 +7,16 @@ use clap::Args;
 use crate::cli::console::{Console, grouped, shown};
 use crate::cli::files::{JsonArgument, check, open_trace, report};
 use crate::error::Result;
-use crate::trace::{Checksums, Header, Statistics, Trace, statistics};
+use crate::trace::{Checksums, Header, Statistics, Trace, statistics_within};
 
 /// Show what a user wants to know first about a trace
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// The trace
     trace: PathBuf,
+    /// MiB that the search for fragments at one depth may take; less takes longer
+    #[arg(long, default_value_t = 512, value_name = "MIB", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=1 << 20))]
+    memory: u64,
     #[command(flatten)]
     json: JsonArgument,
 }
@@ -37,10 +40,14 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let trace = open_trace(&arguments.trace, console)?;
     let json = arguments.json.open()?;
     let progress = console.progress("counting", "fragments");
-    let mut done = 0;
-    let stats = statistics(&trace, |rows| {
-        done += rows;
-        progress.set(done, trace.rows());
+    let memory = arguments.memory << 20;
+    let mut last = 0;
+    let stats = statistics_within(&trace, memory, |done, total| {
+        if done < last {
+            progress.name("looking for equal depths");
+        }
+        last = done;
+        progress.set(done, total);
     })?;
     drop(progress);
     let document = Document {

@@ -139,7 +139,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     }
 
     // No file appears unless all could be written.
-    let saved = write_pictures(&mut files, &first.picture, reference.as_ref())
+    let saved = write_pictures(&mut files, &first.picture, reference.as_ref(), console)
         .and_then(|()| files.into_iter().try_for_each(PictureFile::commit));
     let counted = first.events.as_ref().map_or(0, |events| events.fragments);
     let fragments = gpu.as_ref().map_or(counted, |gpu| gpu.fragments);

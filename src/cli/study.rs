@@ -17,7 +17,7 @@ use crate::report::{About, PAGE, document, write_report};
 use crate::study::file::Study;
 use crate::study::publications::{Effort, measure_publication};
 use crate::study::results::{Missing, Results};
-use crate::study::run::{Runner, Shard, Store, Task, agree, check, merge};
+use crate::study::run::{Runner, Shard, Store, Task, agree, check};
 
 /// Measure a study: what its file says, run by run, into a folder with a report; called
 /// again it goes on where it was interrupted
@@ -76,11 +76,10 @@ pub(super) fn run_merge(arguments: &MergeArguments, console: &Console) -> Result
     arguments.parts.iter().try_for_each(|part| check_input(part, Kind::Folder))?;
     let json = arguments.json.open()?;
     let parts = arguments.parts.iter().map(|part| Store::open(part)).collect::<Result<Vec<_>>>()?;
-    let Some(first) = parts.first() else { return Ok(()) };
     // A refused merge leaves nothing behind.
-    agree(&parts.iter().collect::<Vec<_>>())?;
-    let store = Store::begin(&arguments.output, first.study())?;
-    merge(&store, &parts)?;
+    let agreed = agree(&parts)?;
+    let store = Store::begin(&arguments.output, agreed.study())?;
+    agreed.merge(&store)?;
     let results = reported(&store, None, json, console)?;
     let missing = results.missing.len();
     if missing > 0 {

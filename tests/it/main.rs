@@ -21,6 +21,7 @@ mod layering;
 mod layers;
 mod limits;
 mod loaders;
+mod measured;
 mod models;
 mod python;
 mod results_document;

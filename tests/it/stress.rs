@@ -4,27 +4,26 @@ use std::process::Command;
 
 use serde_json::Value;
 
+use crate::measured::{BESIDE, Run};
+
 /// Runs the command. Returns what it found and what it said.
 fn stress(arguments: &[&str]) -> (Value, String, String) {
     let folder = tempfile::tempdir().unwrap();
     let [json, tables] = ["found.json", "tables.md"].map(|name| folder.path().join(name));
-    let output = Command::new(env!("CARGO_BIN_EXE_screendoor"))
-        .args(["--quiet", "stress"])
-        .args(arguments)
-        .arg("--json")
-        .arg(&json)
-        .arg("-o")
-        .arg(&tables)
-        .output()
-        .unwrap();
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{said}");
+    let outputs = ["--json", "found.json", "-o", "tables.md"];
+    let run = Run::changed(
+        folder.path(),
+        &[&["--quiet", "stress"], arguments, &outputs].concat(),
+        |_| (),
+    );
+    let said = run.error.clone();
+    run.is_good(BESIDE, "stress");
     let found = serde_json::from_slice(&std::fs::read(json).unwrap()).unwrap();
     (found, std::fs::read_to_string(tables).unwrap(), said)
 }
 
 #[test]
-fn nothing_that_is_promised_is_broken_and_nothing_is_lost() {
+pub(crate) fn nothing_that_is_promised_is_broken_and_nothing_is_lost() {
     let (found, tables, said) = stress(&["--seeds", "16"]);
     assert!(!said.contains("fault of screendoor"), "{said}");
     assert!(tables.contains("Everything below keeps what is promised of it."));

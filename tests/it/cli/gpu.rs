@@ -5,6 +5,7 @@ use std::process::Command;
 use serde_json::Value;
 
 use super::{PROGRAM, Workplace};
+use crate::measured::Run;
 use crate::util::gpu;
 
 #[test]
@@ -85,4 +86,26 @@ fn a_gpu_that_is_not_there_is_told() {
         assert!(error.contains("no adapter was found; install a Vulkan driver"), "{error}");
         assert!(!place.path("t.exr").exists());
     }
+}
+
+/// A library below the drivers complains where no display server has set this variable.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_driver_is_quiet() {
+    if gpu().is_none() {
+        return;
+    }
+    let place = Workplace::with_trace();
+    let replay = ["-q", "replay", "t.arrow", "--engine", "gpu"];
+    let said = |name: &str| {
+        let run = Run::changed(&place.path("."), &replay, |command| {
+            command.env_remove("XDG_RUNTIME_DIR").env_remove("DISPLAY");
+            command.env("WAYLAND_DISPLAY", name);
+        });
+        assert!(run.status.success(), "{}", run.error);
+        run.error
+    };
+    // Whether or not there is a display's name to look for.
+    assert_eq!(said(""), "");
+    assert_eq!(said("wayland-0"), "");
 }

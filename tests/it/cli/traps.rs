@@ -185,13 +185,7 @@ fn every_command_writes_json_with_a_schema_and_typed_parameters() {
     schemas.dedup();
     assert_eq!(schemas.len(), 11);
     // The list is whole: a command has --json, or prints no figures.
-    let help = place.good(&["--help"]);
-    let listed = help.lines().skip_while(|l| !l.starts_with("Commands:")).skip(1);
-    let names = listed.take_while(|l| l.starts_with("  ")).filter_map(|l| {
-        let indent = l.len() - l.trim_start().len();
-        (indent == 2).then(|| l.split_whitespace().next().unwrap().to_string())
-    });
-    for name in names.filter(|name| name != "help") {
+    for name in crate::measured::commands() {
         let tried = commands.iter().any(|(arguments, _)| arguments[0] == name);
         // These take minutes at the least; their documents are tested elsewhere.
         assert!(tried || ["reproduce", "stress"].contains(&&*name), "{name} is not tried");

@@ -7,7 +7,7 @@
 use image::{DynamicImage, GrayImage, ImageBuffer, ImageDecoder, ImageFormat, ImageReader, Limits};
 
 use screendoor_trace::error::{Error, Result};
-use screendoor_trace::picture::{can_hold, necessary_chunks};
+use screendoor_trace::picture::{Rgba, can_hold, is_deep, necessary_chunks};
 
 /// The largest side of a texture.
 pub(super) const MAX_SIDE: u32 = 16384;
@@ -132,16 +132,18 @@ pub(super) enum Channel {
 /// A picture of one channel: the opacity that `channel` of `image` says.
 pub(super) fn opacity(image: DynamicImage, channel: Channel) -> DynamicImage {
     let (width, height) = (image.width(), image.height());
-    if is_deep(&image) {
-        let rgba = image.into_rgba16();
-        let channel = chosen(channel, rgba.pixels().any(|p| p.0[3] < u16::MAX));
-        let gray = |x, y| [of(channel, rgba.get_pixel(x, y).0.map(f32::from)) as u16].into();
-        DynamicImage::ImageLuma16(ImageBuffer::from_fn(width, height, gray))
-    } else {
-        let rgba = image.into_rgba8();
-        let channel = chosen(channel, rgba.pixels().any(|p| p.0[3] < u8::MAX));
-        let gray = |x, y| [of(channel, rgba.get_pixel(x, y).0.map(f32::from)) as u8].into();
-        DynamicImage::ImageLuma8(GrayImage::from_fn(width, height, gray))
+    let rgba = Rgba::of(image);
+    let channel = chosen(channel, rgba.is_transparent());
+    let gray = |x, y| of(channel, rgba.get(x, y).map(f32::from)) as u16;
+    match &rgba {
+        Rgba::Sixteen(_) => {
+            let gray = |x, y| [gray(x, y)].into();
+            DynamicImage::ImageLuma16(ImageBuffer::from_fn(width, height, gray))
+        }
+        Rgba::Eight(_) => {
+            let gray = |x, y| [gray(x, y) as u8].into();
+            DynamicImage::ImageLuma8(GrayImage::from_fn(width, height, gray))
+        }
     }
 }
 
@@ -171,9 +173,4 @@ pub(super) fn colours(image: DynamicImage) -> DynamicImage {
     } else {
         DynamicImage::ImageRgb8(image.into_rgb8())
     }
-}
-
-/// Whether its channels have more than 8 bits.
-pub(super) fn is_deep(image: &DynamicImage) -> bool {
-    image.color().bytes_per_pixel() / image.color().channel_count() > 1
 }

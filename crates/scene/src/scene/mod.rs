@@ -322,11 +322,21 @@ impl Scene {
     /// something there at all.
     fn check(&mut self) -> Result<()> {
         let source = &self.source;
+        // First, since a small file can name a shape very often.
+        if u32::try_from(self.triangle_count()).is_err() {
+            let hint = "split the scene";
+            return Err(Error::unsupported(source, "it has more than 2^32 triangles", hint));
+        }
+        let mut checked = vec![false; self.shapes.len()];
         for object in &self.objects {
             let place = format!("{source}, object '{}'", object.name);
             if !object.place.is_finite() {
                 let hint = "correct its transformation";
                 return Err(Error::invalid(place, "it stands at no finite place", hint));
+            }
+            // A shape that several objects show is looked at once.
+            if std::mem::replace(&mut checked[object.shape], true) {
+                continue;
             }
             match &self.shapes[object.shape] {
                 Shape::Mesh(mesh) => check_mesh(mesh, &place)?,
@@ -350,10 +360,6 @@ impl Scene {
         if flat == self.triangle_count() {
             let what = format_args!("all of its {flat} triangles have no area").to_string();
             return Err(Error::invalid(source, what, "give a scene with something to see"));
-        }
-        if u32::try_from(self.triangle_count()).is_err() {
-            let hint = "split the scene";
-            return Err(Error::unsupported(source, "it has more than 2^32 triangles", hint));
         }
         if flat > 0 {
             let warning = format!("{source}: {flat} triangles have no area and draw nothing");

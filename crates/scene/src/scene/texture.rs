@@ -6,10 +6,10 @@ use glam::{Vec2, Vec4};
 use image::DynamicImage;
 
 use crate::scene::file;
-use crate::scene::image_file::{self, MAX_SIDE, is_deep};
+use crate::scene::image_file::{self, MAX_SIDE};
 use crate::scene::sampling::{Filter, Sampling, Wrap};
 use screendoor_trace::error::Result;
-use screendoor_trace::picture::srgb;
+use screendoor_trace::picture::{Rgba, srgb};
 
 /// What the numbers of an image file mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -120,21 +120,12 @@ impl Texture {
         // Decodes a channel that is not alpha.
         let decode = |v: f64| if encoding.is_srgb() { srgb::decode(v) as f32 } else { v as f32 };
         let alpha = |v: f32| if encoding.is_opaque() { 1.0 } else { v };
-        if is_deep(&image) {
-            let table: Vec<f32> = (0..=65535).map(|v| decode(f64::from(v) / 65535.0)).collect();
-            let rgba = image.into_rgba16();
-            return Texture::from_fn(width, height, |x, y| {
-                let [r, g, b, a] = rgba.get_pixel(x, y).0;
-                let [r, g, b] = [r, g, b].map(|v| table[usize::from(v)]);
-                Vec4::new(r, g, b, alpha(f32::from(a) / 65535.0))
-            });
-        }
-        let table: Vec<f32> = (0..=255).map(|v| decode(f64::from(v) / 255.0)).collect();
-        let rgba = image.into_rgba8();
+        let rgba = Rgba::of(image);
+        let table = rgba.table(decode);
         Texture::from_fn(width, height, |x, y| {
-            let [r, g, b, a] = rgba.get_pixel(x, y).0;
+            let [r, g, b, _] = rgba.get(x, y);
             let [r, g, b] = [r, g, b].map(|v| table[usize::from(v)]);
-            Vec4::new(r, g, b, alpha(f32::from(a) / 255.0))
+            Vec4::new(r, g, b, alpha(rgba.alpha(x, y)))
         })
     }
 

@@ -4,7 +4,7 @@ mod partial;
 mod place;
 
 use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 
 pub use partial::{abandon_all, is_partial};
@@ -134,6 +134,15 @@ impl OutputFile {
         let mut file = OutputFile::create(path)?;
         file.write_bytes(bytes)?;
         file.commit()
+    }
+
+    /// The file where what was written can be gone back to and written over: not one that is
+    /// written directly.
+    pub fn seekable(&mut self) -> Option<impl Write + Seek> {
+        match &mut self.target {
+            Target::Beside { file, .. } => Some(file),
+            Target::Direct(_) => None,
+        }
     }
 
     /// Writes `bytes`, with an error that names the file.

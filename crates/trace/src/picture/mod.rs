@@ -4,6 +4,7 @@ mod exr_file;
 mod opened;
 mod png_chunks;
 mod read;
+mod rgba;
 pub mod srgb;
 mod write;
 
@@ -11,6 +12,7 @@ pub use opened::{AlphaDifference, Laid, Opened, Window, lay};
 pub use png_chunks::necessary_chunks;
 pub use read::can_hold;
 pub use read::{layers, open, read};
+pub use rgba::{Rgba, is_deep};
 pub use write::{Layer, PictureFile, write_exr, write_png};
 
 use crate::tile::{TILE_PIXELS, TileGrid, TileId, TileMap};

@@ -7,7 +7,7 @@ use image::ImageDecoder;
 use crate::error::{Error, Result};
 use crate::picture::opened::Opened;
 use crate::picture::write::check_size;
-use crate::picture::{Picture, exr_file, necessary_chunks, srgb};
+use crate::picture::{Picture, Rgba, exr_file, necessary_chunks, srgb};
 use crate::tile::TileGrid;
 
 /// Reads the picture in an EXR file (its layer or part `layer`, or the first that is a
@@ -89,31 +89,17 @@ fn read_png(path: &Path, bytes: &[u8]) -> Result<Opened> {
     let image = image::DynamicImage::from_decoder(decoder).map_err(|e| bad(&e))?;
     let has_alpha = image.color().has_alpha();
     let grid = TileGrid::new(width, height);
-    // Those of 16 bits are not cut to 8: they would look the same where they are not.
-    let deep = image.color().bytes_per_pixel() > image.color().channel_count();
-    let row = |alphas: &mut dyn Iterator<Item = f32>, opened: &mut Opened, y| {
-        let alphas: Vec<f32> = alphas.collect();
+    let rgba = Rgba::of(image);
+    let table = rgba.table(srgb::decode);
+    let pixel = |x, y| {
+        let [r, g, b, _] = rgba.get(x, y);
+        [r, g, b].map(|v| table[usize::from(v)])
+    };
+    let mut opened = Opened::plain(Picture::from_fn(grid, pixel), has_alpha);
+    for y in 0..height {
+        let alphas: Vec<f32> = (0..width).map(|x| rgba.alpha(x, y)).collect();
         opened.put_alpha(0, y, &alphas);
-    };
-    let opened = if deep {
-        let image = image.into_rgba16();
-        let decode = |v: u16| srgb::decode(f64::from(v) / 65535.0);
-        let pixel = |x, y| [0, 1, 2].map(|i| decode(image.get_pixel(x, y).0[i]));
-        let mut opened = Opened::plain(Picture::from_fn(grid, pixel), has_alpha);
-        for (y, pixels) in (0..).zip(image.rows()) {
-            row(&mut pixels.map(|p| f32::from(p.0[3]) / 65535.0), &mut opened, y);
-        }
-        opened
-    } else {
-        let image = image.into_rgba8();
-        let decode = |v: u8| srgb::decode(f64::from(v) / 255.0);
-        let pixel = |x, y| [0, 1, 2].map(|i| decode(image.get_pixel(x, y).0[i]));
-        let mut opened = Opened::plain(Picture::from_fn(grid, pixel), has_alpha);
-        for (y, pixels) in (0..).zip(image.rows()) {
-            row(&mut pixels.map(|p| f32::from(p.0[3]) / 255.0), &mut opened, y);
-        }
-        opened
-    };
+    }
     Ok(opened)
 }
 

@@ -1,11 +1,16 @@
 //! Writing pictures: EXR (linear, layers) and PNG (sRGB, 8 bits).
 
+use std::io::{Cursor, Seek, Write};
 use std::path::Path;
 
+use exr::block::writer::ChunksWriter;
+use exr::block::{BlockIndex, UncompressedBlock};
+use exr::image::write::layers::{LayersWriter, WritableLayers};
 use exr::prelude::{
     Encoding, Image, ImageAttributes, LayerAttributes, SpecificChannels, Text, Vec2, WritableImage,
 };
 use image::ImageEncoder;
+use rayon::prelude::*;
 
 use crate::error::{Error, Result};
 use crate::output::OutputFile;
@@ -72,20 +77,26 @@ impl PictureFile {
         Ok(PictureFile { file: OutputFile::create(path)?, format })
     }
 
-    /// Writes `layers`, pictures of one size. A PNG shows the first alone.
+    /// Writes `layers`, pictures of one size. A PNG shows the first alone. Tells `progress` how
+    /// many blocks of an EXR are written, of how many.
     ///
     /// # Errors
     /// [`Error::Io`] where they cannot be written.
     ///
     /// # Panics
     /// Where there are no layers or their sizes differ.
-    pub fn write(&mut self, layers: &[Layer<'_>]) -> Result<()> {
-        let path = self.file.path();
-        let bytes = match self.format {
-            Format::Exr => exr_bytes(path, layers)?,
-            Format::Png => png_bytes(path, layers[0].picture)?,
-        };
-        self.file.write_bytes(&bytes)
+    pub fn write(
+        &mut self,
+        layers: &[Layer<'_>],
+        progress: &mut dyn FnMut(u64, u64),
+    ) -> Result<()> {
+        match self.format {
+            Format::Exr => encode_exr(&mut self.file, layers, progress),
+            Format::Png => {
+                let bytes = png_bytes(self.file.path(), layers[0].picture)?;
+                self.file.write_bytes(&bytes)
+            }
+        }
     }
 
     /// Puts the file in its place.
@@ -106,7 +117,9 @@ impl PictureFile {
 /// # Panics
 /// Where there are no layers or their sizes differ.
 pub fn write_exr(path: impl AsRef<Path>, layers: &[Layer<'_>]) -> Result<()> {
-    OutputFile::put(&path, &exr_bytes(path.as_ref(), layers)?)
+    let mut file = OutputFile::create(path)?;
+    encode_exr(&mut file, layers, &mut |_, _| ())?;
+    file.commit()
 }
 
 /// Writes a picture as an 8-bit sRGB PNG.
@@ -117,10 +130,18 @@ pub fn write_png(path: impl AsRef<Path>, picture: &Picture) -> Result<()> {
     OutputFile::put(&path, &png_bytes(path.as_ref(), picture)?)
 }
 
-/// The bytes of an EXR file; `path` names it in errors.
-fn exr_bytes(path: &Path, layers: &[Layer<'_>]) -> Result<Vec<u8>> {
+/// Blocks of 16 lines that are made and packed at a time: some for each of many threads.
+const BLOCKS_AT_A_TIME: usize = 64;
+
+/// Writes an EXR file: its blocks are packed in parallel and stand there in order.
+fn encode_exr(
+    file: &mut OutputFile,
+    layers: &[Layer<'_>],
+    progress: &mut dyn FnMut(u64, u64),
+) -> Result<()> {
+    let path = file.path().to_path_buf();
     let (width, height) = (layers[0].picture.width(), layers[0].picture.height());
-    check_size(path, width, height)?;
+    check_size(&path, width, height)?;
     let size = Vec2(width as usize, height as usize);
     let layer_data: exr::prelude::Layers<_> = layers
         .iter()
@@ -145,13 +166,46 @@ fn exr_bytes(path: &Path, layers: &[Layer<'_>]) -> Result<Vec<u8>> {
         .other
         .insert(Text::from("writer"), exr::prelude::AttributeValue::Text(writer.as_str().into()));
     let image = Image { attributes, layer_data };
-    // The encoder seeks, which a file under construction does not: it is encoded
-    // in memory.
-    let mut bytes = std::io::Cursor::new(Vec::new());
-    let encoded = image.write().non_parallel().to_buffered(&mut bytes);
-    encoded.map_err(|e| exr_error(path, "write", e))?;
-    Ok(bytes.into_inner())
+    let headers = image.write().infer_meta_data();
+    let pixels = image.layer_data.create_writer(&headers);
+    let total: u64 = headers.iter().map(|header| header.chunk_count as u64).sum();
+    let mut write = |to: &mut dyn Sink| {
+        exr::block::write(to, headers.clone(), true, |meta, writer| {
+            let pack = |(place, index): (usize, BlockIndex)| {
+                let data = pixels.extract_uncompressed_block(&meta.headers, index);
+                let block = UncompressedBlock { index, data };
+                Ok((place, block.compress_to_chunk(&meta.headers)?))
+            };
+            let mut blocks = meta.enumerate_ordered_header_block_indices();
+            let mut done = 0;
+            loop {
+                let some: Vec<_> = blocks.by_ref().take(BLOCKS_AT_A_TIME).collect();
+                if some.is_empty() {
+                    return Ok(());
+                }
+                let packed: Vec<exr::error::Result<_>> = some.into_par_iter().map(pack).collect();
+                for packed in packed {
+                    let (place, chunk) = packed?;
+                    writer.write_chunk(place, chunk)?;
+                    done += 1;
+                }
+                progress(done, total);
+            }
+        })
+    };
+    // The encoder goes back to write where each block stands.
+    if let Some(mut file) = file.seekable() {
+        return write(&mut file).map_err(|e| exr_error(&path, "write", e));
+    }
+    let mut bytes = Cursor::new(Vec::new());
+    write(&mut bytes).map_err(|e| exr_error(&path, "write", e))?;
+    file.write_bytes(&bytes.into_inner())
 }
+
+/// What an EXR file is written to.
+trait Sink: Write + Seek {}
+
+impl<W: Write + Seek> Sink for W {}
 
 /// The bytes of a PNG file; `path` names it in errors.
 fn png_bytes(path: &Path, picture: &Picture) -> Result<Vec<u8>> {

@@ -34,6 +34,8 @@ pub use column::{ChannelColumn, Column, ColumnId, CoverageColumn, Native, Scalar
 pub use fragment::{DepthPlane, Fragment, MAX_SAMPLES, SampleMask, Unorm32};
 pub use header::{ColourFormat, FORMAT_VERSION, Header, MAX_SIDE, SamplePattern};
 pub use read::{Checksums, Trace};
-pub use stats::{AlphaStatistics, Distribution, Objects, Statistics, statistics};
-pub use ties::tied_fragments;
+pub use stats::{
+    AlphaStatistics, Distribution, Objects, Statistics, statistics, statistics_within,
+};
+pub use ties::{tied_fragments, tied_fragments_within};
 pub use write::{Compression, TraceWriter, WriteOptions, Written};

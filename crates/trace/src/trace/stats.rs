@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::Result;
 use crate::tile::{TILE_PIXELS, TileGrid, TileMap};
 use crate::trace::read::Trace;
-use crate::trace::ties::tied_fragments;
+use crate::trace::ties::{self, Counts};
 
 /// Objects beyond this many are counted as one remainder.
 const MAX_OBJECTS: usize = 1 << 16;
@@ -30,7 +30,7 @@ pub struct Statistics {
     /// Fragments that cover a sample, on average over the samples of the covered pixels.
     pub layers: f64,
     /// How many fragments share a depth with another one at a sample that both cover
-    /// ([`tied_fragments`]): designs that tell fragments apart by their depths see them at
+    /// ([`tied_fragments`](crate::trace::tied_fragments)): designs that tell fragments apart by their depths see them at
     /// one place.
     pub tied_fragments: u64,
     /// Alphas.
@@ -116,19 +116,33 @@ impl Distribution {
     }
 }
 
-/// Reads a trace and counts. `progress` is told the fragments of each batch of the first
-/// reading, after which [`tied_fragments`] reads it again. Memory is bounded by the touched
-/// tiles and by what that holds at a time.
+/// As [`statistics_within`], in 512 MiB; `progress` is told how many fragments were read.
 ///
 /// # Errors
-/// As [`Trace::batch`].
+/// As [`statistics_within`].
 pub fn statistics(trace: &Trace, mut progress: impl FnMut(u64)) -> Result<Statistics> {
+    statistics_within(trace, ties::MEMORY, |done, _| progress(done))
+}
+
+/// Reads a trace and counts; reads it again to find fragments at one depth, as often as
+/// `memory` bytes for them make necessary. A KiB for each touched tile comes to that.
+/// `progress` is told how many fragments were read, of how many: of the first reading, then
+/// of all others.
+///
+/// # Errors
+/// As [`Trace::batch`]; [`crate::error::Error::Config`] where one pixel's fragments need more
+/// memory: a quarter of a byte each.
+pub fn statistics_within(
+    trace: &Trace,
+    memory: u64,
+    mut progress: impl FnMut(u64, u64),
+) -> Result<Statistics> {
     let header = trace.header();
     let samples = header.pattern.samples();
     let grid = TileGrid::new(header.width, header.height);
     // A pixel's fragments; the top bit says that an edge crosses it.
     const EDGE: u32 = 1 << 31;
-    let mut counts: TileMap<Box<[u32; TILE_PIXELS]>> = TileMap::new(grid);
+    let mut counts: Counts = TileMap::new(grid);
     let mut whole_fragments = 0;
     let mut covered_samples = 0_u64;
     let mut alpha_sum = 0.0;
@@ -144,6 +158,7 @@ pub fn statistics(trace: &Trace, mut progress: impl FnMut(u64)) -> Result<Statis
     let mut objects: BTreeMap<u32, u64> = BTreeMap::new();
     let mut more = false;
     let mut primitives = 0;
+    let mut done = 0;
 
     for batch in trace.batches() {
         let batch = batch?;
@@ -179,14 +194,17 @@ pub fn statistics(trace: &Trace, mut progress: impl FnMut(u64)) -> Result<Statis
             }
             primitives = primitives.max(u64::from(f.primitive) + 1);
         }
-        progress(batch.len() as u64);
+        done += batch.len() as u64;
+        progress(done, trace.rows());
     }
 
     let mut pixels_by_count = BTreeMap::new();
     let mut interior_pixels = 0;
-    for count in counts.touched().iter().flat_map(|(_, tile)| tile.iter()).filter(|c| **c > 0) {
-        *pixels_by_count.entry(count & !EDGE).or_insert(0) += 1;
-        interior_pixels += u64::from(count & EDGE == 0);
+    let pixels = counts.touched_mut().iter_mut().flat_map(|(_, tile)| tile.iter_mut());
+    for count in pixels.filter(|count| **count > 0) {
+        interior_pixels += u64::from(*count & EDGE == 0);
+        *count &= !EDGE;
+        *pixels_by_count.entry(*count).or_insert(0) += 1;
     }
     let fragments = trace.rows();
     let covered_pixels: u64 = pixels_by_count.values().sum();
@@ -210,7 +228,7 @@ pub fn statistics(trace: &Trace, mut progress: impl FnMut(u64)) -> Result<Statis
         } else {
             covered_samples as f64 / (covered_pixels as f64 * f64::from(samples))
         },
-        tied_fragments: tied_fragments(trace, samples)?,
+        tied_fragments: ties::tied(trace, samples, &counts, memory, &mut progress)?,
         alpha,
         depth: depth.map(|d| d.map(share)),
         objects: Objects { count: objects.len(), more, largest },

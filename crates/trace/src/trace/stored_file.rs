@@ -18,11 +18,34 @@ pub(super) struct StoredFile {
     file: File,
     /// Its length, and when it was last written to, where the system tells.
     was: (u64, Option<SystemTime>),
-    idle: Arc<Mutex<Vec<Vec<u8>>>>,
+    idle: Arc<Mutex<Idle>>,
 }
 
-/// Buffers that are kept for the next piece, at most: two for each thread that reads.
-const MOST_IDLE: usize = 32;
+/// Bytes of buffers that are kept for the next pieces, at most: batches of usual size for two
+/// dozen readers. What a command takes beside its limit of memory contains them.
+const MOST_IDLE: usize = 64 << 20;
+
+/// Buffers that nobody reads.
+#[derive(Debug, Default)]
+struct Idle {
+    list: Vec<Vec<u8>>,
+    bytes: usize,
+}
+
+impl Idle {
+    fn take(&mut self) -> Option<Vec<u8>> {
+        let buffer = self.list.pop()?;
+        self.bytes -= buffer.capacity();
+        Some(buffer)
+    }
+
+    fn put(&mut self, buffer: Vec<u8>) {
+        if self.bytes + buffer.capacity() <= MOST_IDLE {
+            self.bytes += buffer.capacity();
+            self.list.push(buffer);
+        }
+    }
+}
 
 fn state(metadata: &Metadata) -> (u64, Option<SystemTime>) {
     (metadata.len(), metadata.modified().ok())
@@ -59,7 +82,7 @@ impl StoredFile {
     /// [`Error::Io`] where they cannot be read; [`Error::Invalid`] where they are not there
     /// any more.
     pub fn bytes(&self, place: &str, offset: u64, length: usize) -> Result<Bytes> {
-        let idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        let idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner).take();
         let mut buffer = idle.unwrap_or_default();
         // What is in it is written over; only what it grows by is cleared.
         buffer.resize(length, 0);
@@ -93,7 +116,7 @@ fn read_exact_at(file: &File, mut buffer: &mut [u8], mut offset: u64) -> io::Res
 /// A buffer that goes back when nobody reads it any more.
 struct Lent {
     buffer: Vec<u8>,
-    idle: Arc<Mutex<Vec<Vec<u8>>>>,
+    idle: Arc<Mutex<Idle>>,
 }
 
 impl AsRef<[u8]> for Lent {
@@ -105,9 +128,7 @@ impl AsRef<[u8]> for Lent {
 impl Drop for Lent {
     fn drop(&mut self) {
         let mut idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner);
-        if idle.len() < MOST_IDLE {
-            idle.push(std::mem::take(&mut self.buffer));
-        }
+        idle.put(std::mem::take(&mut self.buffer));
     }
 }
 
@@ -134,5 +155,19 @@ mod tests {
         drop(piece);
         // A buffer that held more before gives no more than is asked for.
         assert_eq!(stored.bytes("a", 0, 3).unwrap()[..], [2; 3]);
+    }
+
+    #[test]
+    fn few_bytes_are_kept_for_later() {
+        let mut idle = Idle::default();
+        assert_eq!(idle.take(), None);
+        for _ in 0..100 {
+            idle.put(Vec::with_capacity(1 << 20));
+        }
+        idle.put(Vec::with_capacity(1 << 30));
+        let held = |idle: &Idle| idle.list.iter().map(Vec::capacity).sum::<usize>();
+        assert_eq!((idle.list.len(), held(&idle)), (64, idle.bytes));
+        idle.take();
+        assert_eq!(held(&idle), idle.bytes);
     }
 }

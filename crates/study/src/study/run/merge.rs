@@ -1,23 +1,25 @@
 //! Parts of a study put together.
 
+use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 
+use crate::study::file::Study;
 use crate::study::record::Record;
 use crate::study::run::store::Store;
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::output::{OutputFile, is_partial};
 
-/// Puts the parts in `parts` together in the folder of `into`. What is there already stays;
-/// done again it changes nothing.
-///
-/// # Errors
-/// As [`agree`]; [`Error::Io`].
-pub fn merge(into: &Store, parts: &[Store]) -> Result<()> {
-    let all: Vec<&Store> = std::iter::once(into).chain(parts).collect();
-    agree(&all)?;
-    parts.iter().try_for_each(|part| bring(into, part))
+/// Parts of a study that can be put together: each was read once.
+#[derive(Debug)]
+pub struct Agreed<'a> {
+    first: &'a Store,
+    parts: &'a [Store],
+    /// The content of each scene's trace and the runs' records without times, with the folder
+    /// of the part that they are of.
+    scenes: BTreeMap<usize, (String, PathBuf)>,
+    records: BTreeMap<String, (Record, PathBuf)>,
 }
 
 /// Finds out whether parts can be put together. Nothing is written.
@@ -26,62 +28,90 @@ pub fn merge(into: &Store, parts: &[Store]) -> Result<()> {
 /// [`Error::Config`] where they are of different studies; [`Error::Invalid`] where two of them
 /// had different traces for a scene, or differ in what is no measured time, and where a
 /// record is damaged.
-pub fn agree(parts: &[&Store]) -> Result<()> {
-    let Some((first, others)) = parts.split_first() else { return Ok(()) };
-    for part in others {
-        if part.study() != first.study() {
-            let (a, b) = (part.folder().display(), first.folder().display());
-            return Err(Error::config(
-                format_args!("{a} and {b} are parts of different studies"),
-                "put parts of one study together",
-            ));
+pub fn agree(parts: &[Store]) -> Result<Agreed<'_>> {
+    let Some(first) = parts.first() else {
+        return Err(Error::config("there are no parts to put together", "name their folders"));
+    };
+    let (scenes, records) = Default::default();
+    let mut agreed = Agreed { first, parts, scenes, records };
+    parts.iter().try_for_each(|part| agreed.is_of_study(part))?;
+    parts.iter().try_for_each(|part| agreed.add_scenes(part))?;
+    parts.iter().try_for_each(|part| agreed.add_records(part))?;
+    Ok(agreed)
+}
+
+impl Agreed<'_> {
+    /// The study that they are of.
+    pub fn study(&self) -> &Study {
+        self.first.study()
+    }
+
+    /// Puts them together in the folder of `into`. What is there already stays; done again it
+    /// changes nothing.
+    ///
+    /// # Errors
+    /// As [`agree`], of what is there already; [`Error::Io`].
+    pub fn merge(mut self, into: &Store) -> Result<()> {
+        self.is_of_study(into)?;
+        self.add_scenes(into)?;
+        self.add_records(into)?;
+        self.parts.iter().try_for_each(|part| bring(into, part))
+    }
+
+    fn is_of_study(&self, part: &Store) -> Result<()> {
+        if part.study() == self.study() {
+            return Ok(());
         }
+        let (a, b) = (part.folder().display(), self.first.folder().display());
+        Err(Error::config(
+            format_args!("{a} and {b} are parts of different studies"),
+            "put parts of one study together",
+        ))
     }
-    for scene in 0..first.study().scenes.len() {
-        same_scene(parts, scene)?;
-    }
-    // What each part holds must agree in itself, too.
-    parts.iter().try_for_each(|part| part.results().map(|_| ()))?;
-    for job in first.jobs() {
-        let mut known: Option<(Record, &Store)> = None;
-        for store in parts {
-            let Some(mut record) = store.record(job)? else { continue };
-            record.speed.clear();
-            match &known {
-                Some((other, place)) if *other != record => {
-                    let (a, b) = (place.folder().display(), store.folder().display());
+
+    fn add_scenes(&mut self, part: &Store) -> Result<()> {
+        for scene in 0..self.study().scenes.len() {
+            let Some(facts) = part.facts(scene)? else { continue };
+            match self.scenes.get(&scene) {
+                Some((content, other)) if *content != facts.content => {
+                    let (a, b) = (other.display(), part.folder().display());
                     return Err(Error::invalid(
-                        store.record_file(&job.id).display(),
+                        part.scene_file(scene).display(),
+                        format_args!("{a} and {b} have different traces of scene '{}'", facts.name),
+                        "measure the parts from the same scene files, with one version",
+                    ));
+                }
+                Some(_) => {}
+                None => {
+                    self.scenes.insert(scene, (facts.content, part.folder().to_path_buf()));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn add_records(&mut self, part: &Store) -> Result<()> {
+        // What a part holds must agree in itself, too.
+        for mut record in part.results()?.records {
+            record.speed.clear();
+            match self.records.get(&record.id) {
+                Some((other, place)) if *other != record => {
+                    let (a, b) = (place.display(), part.folder().display());
+                    return Err(Error::invalid(
+                        part.record_file(&record.id).display(),
                         format_args!("{a} and {b} have measured different errors for one run"),
                         "were they measured by different versions? remove one of the two",
                     ));
                 }
                 Some(_) => {}
-                None => known = Some((record, store)),
+                None => {
+                    let place = part.folder().to_path_buf();
+                    self.records.insert(record.id.clone(), (record, place));
+                }
             }
         }
+        Ok(())
     }
-    Ok(())
-}
-
-fn same_scene(parts: &[&Store], scene: usize) -> Result<()> {
-    let mut known: Option<(String, &Store)> = None;
-    for store in parts {
-        let Some(facts) = store.facts(scene)? else { continue };
-        match &known {
-            Some((content, other)) if *content != facts.content => {
-                let (a, b) = (other.folder().display(), store.folder().display());
-                return Err(Error::invalid(
-                    store.scene_file(scene).display(),
-                    format_args!("{a} and {b} have different traces of scene '{}'", facts.name),
-                    "measure the parts from the same scene files, with one version",
-                ));
-            }
-            Some(_) => {}
-            None => known = Some((facts.content, store)),
-        }
-    }
-    Ok(())
 }
 
 /// Copies what a part has and the whole has not; records last.
@@ -102,12 +132,12 @@ fn bring(into: &Store, part: &Store) -> Result<()> {
     files.sort_by_key(|p| p.extension().is_some_and(|e| e == "md"));
     files.iter().try_for_each(|path| copy(path))?;
     for job in part.jobs() {
-        if part.record(job)?.is_some() {
+        if part.record_file(&job.id).exists() {
             copy(&part.folder().join(Store::picture_name(&job.id)))?;
             copy(&part.explanation_file(&job.id))?;
             copy(&part.record_file(&job.id))?;
             let _ = fs::remove_file(into.failure_file(&job.id));
-        } else if into.record(job)?.is_none() {
+        } else if !into.record_file(&job.id).exists() {
             copy(&part.failure_file(&job.id))?;
         }
     }

@@ -14,7 +14,7 @@ use std::path::Path;
 
 pub use check::check;
 pub use measure::SIGMAS;
-pub use merge::{agree, merge};
+pub use merge::{Agreed, agree};
 pub use store::{Store, read_json};
 pub use tasks::{Job, Shard, Task, jobs, tasks};
 

@@ -14,7 +14,9 @@ use screendoor_trace::error::{Error, Result};
 use screendoor_trace::output::OutputFile;
 use screendoor_trace::picture::Picture;
 use screendoor_trace::tile::{TILE_PIXELS, TileGrid, TileMap};
-use screendoor_trace::trace::{Trace, TraceWriter, WriteOptions, statistics, tied_fragments};
+use screendoor_trace::trace::{
+    Trace, TraceWriter, WriteOptions, statistics_within, tied_fragments_within,
+};
 
 /// What runs are told of.
 pub type Watch<'a> = &'a (dyn Fn(&str) + Sync);
@@ -135,7 +137,7 @@ fn facts(
             Some(pixel) => pixel,
             None => telling_pixel(trace)?,
         },
-        statistics: statistics(trace, |_| ())?,
+        statistics: statistics_within(trace, store.study().memory << 20, |_, _| ())?,
     };
     Store::put_sealed(&store.scene_file(index), &facts)?;
     Ok(facts)
@@ -220,7 +222,7 @@ impl Reference {
             tied_fragments: match scene.facts.statistics.tied_fragments {
                 0 => 0,
                 all if samples == trace.header().pattern.samples() => all,
-                _ => tied_fragments(trace, samples)?,
+                _ => tied_fragments_within(trace, samples, study.memory << 20)?,
             },
             flip: seen.then(|| Flip::new(&picture)),
             picture,

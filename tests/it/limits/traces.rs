@@ -1,91 +1,49 @@
-//! Peak memory and time of commands on hostile sizes: within `--memory` and a constant, or
-//! refused at once.
+//! Traces of hostile sizes.
 
 use std::fs;
 use std::path::Path;
-use std::process::{Child, Command, Output, Stdio};
-use std::time::{Duration, Instant};
+use std::process::{Command, Stdio};
+use std::time::Duration;
 
 use screendoor::design::DESIGNS;
 use screendoor::trace::{
     DepthPlane, Fragment, Header, SampleMask, TraceWriter, Unorm32, WriteOptions,
 };
 
-use crate::util::header;
+use crate::measured::{BESIDE, PROGRAM, Run, has_proc};
+use crate::util::{gpu, header};
 
-const PROGRAM: &str = env!("CARGO_BIN_EXE_screendoor");
-
-/// MiB that a command may take beside what `--memory` says: the program itself, windows of
-/// fragments for a few threads, and the touched tiles' state.
-const BESIDE: u64 = 320;
-
-/// The largest resident memory so far of a running process, in KiB (`proc_pid_status(5)`).
-/// What `wait4` tells would be no less than this test's own.
-fn peak(child: &Child) -> Option<u64> {
-    let status = fs::read_to_string(format!("/proc/{}/status", child.id())).ok()?;
-    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
-    line.split_whitespace().nth(1)?.parse().ok()
-}
-
-/// What a run said, its largest resident memory in MiB, and how long it took.
-struct Run {
-    output: Output,
-    mib: u64,
-    seconds: f64,
-}
-
-impl Run {
-    fn of(folder: &Path, arguments: &[&str]) -> Self {
-        let start = Instant::now();
-        let mut child = Command::new(PROGRAM)
-            .args(arguments)
-            .args(["--threads", "2"])
-            .current_dir(folder)
-            .stdout(Stdio::null())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let mut highest = 0;
-        while child.try_wait().unwrap().is_none() {
-            highest = highest.max(peak(&child).unwrap_or(0));
-            std::thread::sleep(Duration::from_millis(2));
-        }
-        let output = child.wait_with_output().unwrap();
-        let seconds = start.elapsed().as_secs_f64();
-        let run = Run { output, mib: highest >> 10, seconds };
-        println!("{arguments:?}: {} MiB, {seconds:.1} s; {}", run.mib, run.error().trim());
-        run
-    }
-
-    fn error(&self) -> String {
-        String::from_utf8_lossy(&self.output.stderr).to_string()
-    }
-
-    /// Holds it to a limit: done within it, or refused with what it needs.
-    fn is_within(&self, mib: u64, what: &str) {
-        let error = self.error();
-        let refused = self.output.status.code() == Some(2) && error.contains("MiB");
-        assert!(self.output.status.success() || refused, "{what}: {error}");
-        assert!(self.mib <= mib + BESIDE, "{what}: {} MiB; {error}", self.mib);
-    }
+/// A fragment's depth.
+fn depth(i: u32) -> u32 {
+    i.wrapping_mul(0x9e37_79b9)
 }
 
 /// Writes a trace of `count` fragments, the place of each as `pixel` has it, each of a
 /// primitive of its own and so faint that nothing can be left out.
-fn write(path: &Path, header: &Header, count: u32, pixel: impl Fn(u32) -> (u16, u16)) {
+pub(super) fn write(path: &Path, header: &Header, count: u32, pixel: impl Fn(u32) -> (u16, u16)) {
+    write_with(path, header, count, |i| (pixel(i), 0.01), WriteOptions::default());
+}
+
+/// As [`write`], with alphas.
+fn write_with(
+    path: &Path,
+    header: &Header,
+    count: u32,
+    fragment: impl Fn(u32) -> ((u16, u16), f32),
+    options: WriteOptions,
+) {
     let file = fs::File::create(path).unwrap();
     let file = std::io::BufWriter::new(file);
-    let options = WriteOptions::default();
     let mut writer = TraceWriter::new(file, "test", header.clone(), options).unwrap();
     for i in 0..count {
-        let (x, y) = pixel(i);
+        let ((x, y), alpha) = fragment(i);
         let fragment = Fragment {
             x,
             y,
             coverage: SampleMask::first(header.pattern.samples()),
-            depth: DepthPlane { z: Unorm32(i.wrapping_mul(0x9e37_79b9)), dzdx: 0, dzdy: 0 },
+            depth: DepthPlane { z: Unorm32(depth(i)), dzdx: 0, dzdy: 0 },
             colour: [0.5, 0.25, 0.125],
-            alpha: 0.01,
+            alpha,
             primitive: i,
             object: 0,
         };
@@ -94,17 +52,14 @@ fn write(path: &Path, header: &Header, count: u32, pixel: impl Fn(u32) -> (u16, 
     writer.finish().unwrap();
 }
 
-fn has_proc() -> bool {
-    let has = Path::new("/proc/self/status").exists();
-    if !has {
-        eprintln!("skipped: memory is measured by way of /proc");
-    }
-    has
+/// The places of fragments that are spread over 256 × 256 pixels.
+pub(super) fn many(i: u32) -> (u16, u16) {
+    ((i % 256) as u16, (i / 256 % 256) as u16)
 }
 
 /// Every design and every command that reads traces, on one pixel of `deep` fragments and on
-/// a frame of `many`, with `memory` MiB allowed.
-fn hold_all(deep: u32, many: u32, memory: u64) {
+/// a frame of `spread`, with `memory` MiB allowed.
+fn hold_all(deep: u32, spread: u32, memory: u64) {
     if !has_proc() {
         return;
     }
@@ -112,9 +67,7 @@ fn hold_all(deep: u32, many: u32, memory: u64) {
     let folder = folder.path();
     let header = header(256, 256, 4);
     write(&folder.join("deep.arrow"), &header, deep, |_| (100, 100));
-    write(&folder.join("many.arrow"), &header, many, |i| {
-        ((i % 256) as u16, (i / 256 % 256) as u16)
-    });
+    write(&folder.join("many.arrow"), &header, spread, many);
     let allowed = memory.to_string();
     for trace in ["deep.arrow", "many.arrow"] {
         for design in DESIGNS {
@@ -122,13 +75,12 @@ fn hold_all(deep: u32, many: u32, memory: u64) {
             let run = Run::of(folder, &["replay", trace, "-d", name, "--memory", &allowed]);
             run.is_within(memory, &format!("{name} on {trace}"));
         }
-        for command in [&["info", trace][..], &["verify", trace]] {
-            let run = Run::of(folder, command);
-            assert!(run.output.status.success(), "{}", run.error());
-            // `info` holds the fragments of a tile to find those of one depth.
-            let tile = (u64::from(deep) * 64) >> 20;
-            run.is_within(tile, &format!("{command:?}"));
-        }
+        Run::of(folder, &["verify", trace]).is_good(BESIDE, "verify");
+        Run::of(folder, &["info", trace, "--memory", &allowed]).is_good(memory + BESIDE, "info");
+        let designs = ["--designs", "lk,exact,sorted-blend", "--runs", "1"];
+        let throughput = [&["throughput", trace, "--memory", &allowed], &designs[..]].concat();
+        let on_cpu = [&throughput[..], &["--engines", "fast,reference"]].concat();
+        Run::of(folder, &on_cpu).is_within(memory, "throughput");
         for design in ["lk", "exact", "sorted-blend", "hybrid"] {
             for last in [None, Some("5")] {
                 let pixel = ["explain", trace, "--pixel", "100,100", "-d", design];
@@ -141,48 +93,68 @@ fn hold_all(deep: u32, many: u32, memory: u64) {
 }
 
 #[test]
-fn memory_is_what_was_allowed_and_a_constant() {
+pub(super) fn memory_is_what_was_allowed_and_a_constant() {
     hold_all(20_000, 200_000, 4);
 }
 
+/// So many that what keeps 30 bytes of each is told from what keeps none.
 #[test]
-#[ignore = "writes traces of 2 GB, takes many minutes"]
-fn so_it_is_with_tens_of_millions_of_fragments() {
-    hold_all(30_000_000, 30_000_000, 64);
+#[ignore = "writes traces of 800 MB, takes two minutes"]
+fn so_it_is_with_twelve_million_fragments() {
+    hold_all(12_000_000, 12_000_000, 16);
 }
 
 #[test]
-fn a_story_that_is_too_long_is_refused_with_what_it_needs() {
+pub(super) fn a_story_that_is_too_long_is_refused_with_what_it_needs() {
     let folder = tempfile::tempdir().unwrap();
     write(&folder.path().join("t.arrow"), &header(8, 8, 8), 30_000, |_| (3, 3));
     let explain = ["explain", "t.arrow", "--pixel", "3,3", "--memory", "16"];
     let run = Run::of(folder.path(), &explain);
-    let error = run.error();
-    assert_eq!(run.output.status.code(), Some(2), "{error}");
+    let error = &run.error;
+    assert_eq!(run.status.code(), Some(2), "{error}");
     assert!(error.contains("holds 30000 fragments, whose story takes"), "{error}");
     // What is proposed fits.
     let (_, after) = error.split_once("show the last ").unwrap();
     let last = after.split_whitespace().next().unwrap();
     let run = Run::of(folder.path(), &[&explain[..], &["--last", last]].concat());
-    assert!(run.output.status.success(), "{}", run.error());
+    assert!(run.status.success(), "{}", run.error);
 }
 
 #[test]
-fn one_depth_for_each_primitive_is_refused_where_there_are_too_many() {
+pub(super) fn the_end_of_a_long_story_is_told_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    // An opaque fragment, behind all others, asks for a pass of its own, which looks at no other.
+    let count = 60_000;
+    let last = (0..count).max_by_key(|i| depth(*i)).unwrap();
+    let fragment = |i| ((3, 3), if i == last { 1.0 } else { 0.01 });
+    let path = folder.path().join("t.arrow");
+    write_with(&path, &header(8, 8, 8), count, fragment, WriteOptions::default());
+    let explain = ["explain", "t.arrow", "--pixel", "3,3", "-d", "sorted-blend"];
+    let run = Run::of(folder.path(), &explain);
+    assert_eq!(run.status.code(), Some(2), "{}", run.error);
+    assert!(run.error.contains("composites anew for each of"), "{}", run.error);
+    let run = Run::of(folder.path(), &[&explain[..], &["--last", "5"]].concat());
+    assert!(run.status.success(), "{}", run.error);
+    assert!(run.output.contains("fragment 60000 of 60000"), "{}", run.output);
+    assert!(run.seconds < 10.0, "{} s", run.seconds);
+}
+
+#[test]
+pub(super) fn one_depth_for_each_primitive_is_refused_where_there_are_too_many() {
     let folder = tempfile::tempdir().unwrap();
     write(&folder.path().join("t.arrow"), &header(64, 64, 4), 100_000, |i| ((i % 64) as u16, 5));
     let sorted = ["replay", "t.arrow", "-d", "sorted-blend", "--memory"];
     let run = Run::of(folder.path(), &[&sorted[..], &["8"]].concat());
-    let error = run.error();
-    assert_eq!(run.output.status.code(), Some(2), "{error}");
+    let error = &run.error;
+    assert_eq!(run.status.code(), Some(2), "{error}");
     let (_, after) = error.split_once("takes up to ").unwrap();
     let needed = after.split_whitespace().next().unwrap();
     let run = Run::of(folder.path(), &[&sorted[..], &[needed]].concat());
-    assert!(run.output.status.success(), "{}", run.error());
+    assert!(run.status.success(), "{}", run.error);
 }
 
 #[test]
-fn a_vast_frame_costs_what_is_drawn_in_it() {
+pub(super) fn a_vast_frame_costs_what_is_drawn_in_it() {
     if !has_proc() {
         return;
     }
@@ -199,7 +171,7 @@ fn a_vast_frame_costs_what_is_drawn_in_it() {
     ];
     for command in commands {
         let run = Run::of(folder.path(), command);
-        assert!(run.output.status.success(), "{command:?}: {}", run.error());
+        assert!(run.status.success(), "{command:?}: {}", run.error);
         // The frame has 16 million tiles, of which seven are touched.
         assert!(run.mib < 1024, "{command:?}: {} MiB", run.mib);
         assert!(run.seconds < 30.0, "{command:?}: {} s", run.seconds);
@@ -207,7 +179,7 @@ fn a_vast_frame_costs_what_is_drawn_in_it() {
 }
 
 #[test]
-fn a_large_picture_costs_what_it_shows() {
+pub(super) fn a_large_picture_costs_what_it_shows() {
     if !has_proc() {
         return;
     }
@@ -216,9 +188,48 @@ fn a_large_picture_costs_what_it_shows() {
     // All values at once would be 108 MiB, the pixels of both pictures 432.
     for command in [&["replay", "t.arrow", "-o", "a.exr"][..], &["compare", "a.exr", "a.exr"]] {
         let run = Run::of(folder.path(), command);
-        assert!(run.output.status.success(), "{command:?}: {}", run.error());
+        assert!(run.status.success(), "{command:?}: {}", run.error);
         assert!(run.mib < 100, "{command:?}: {} MiB", run.mib);
     }
+}
+
+#[test]
+fn large_batches_cost_a_few_of_them() {
+    if !has_proc() {
+        return;
+    }
+    let folder = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
+    let path = folder.path().join("t.arrow");
+    let rows = 1 << 21;
+    let options = WriteOptions { batch_rows: rows, ..WriteOptions::default() };
+    write_with(&path, &header(256, 256, 4), 4 * rows as u32, |i| (many(i), 0.01), options);
+    let batch = (fs::metadata(&path).unwrap().len() / 4) >> 20;
+    for command in [&["info"][..], &["verify"], &["replay"], &["replay", "-d", "exact"]] {
+        let run = Run::of(
+            folder.path(),
+            &[
+                command,
+                &["t.arrow"],
+                if command[0] == "verify" { &[] } else { &["--memory", "16"] },
+            ]
+            .concat(),
+        );
+        run.is_good(16 + 4 * batch + BESIDE, &format!("{command:?}"));
+    }
+}
+
+/// What a GPU's own driver takes, which may be a program for the processor, in MiB.
+const DRIVER: u64 = 512;
+
+#[test]
+fn throughput_on_a_gpu_is_held_too() {
+    if gpu().is_none() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    write(&folder.path().join("t.arrow"), &header(256, 256, 4), 200_000, many);
+    let throughput = ["throughput", "t.arrow", "--memory", "4", "--runs", "1", "--engines", "gpu"];
+    Run::of(folder.path(), &throughput).is_good(4 + BESIDE + DRIVER, "throughput");
 }
 
 /// Writes over a trace again and again while it is replayed: each run gives the right picture
