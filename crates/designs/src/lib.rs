@@ -22,6 +22,7 @@ mod kbuffer;
 mod lk;
 mod mboit;
 mod mlab;
+mod residual;
 mod slab;
 mod sorted_blend;
 mod systematic;
@@ -40,6 +41,7 @@ pub use kbuffer::KBuffer;
 pub use lk::LaineKarras;
 pub use mboit::MomentBased;
 pub use mlab::Mlab;
+pub use residual::Residual;
 pub use slab::Slab;
 pub use sorted_blend::SortedBlend;
 pub use systematic::Systematic;
@@ -57,6 +59,7 @@ pub static DESIGNS: &[Entry] = &[
     Entry::of::<Exact>(),
     Entry::of::<LaineKarras>(),
     Entry::of::<Systematic>(),
+    Entry::of::<Residual>(),
     Entry::of::<Enderton>(),
     Entry::of::<HashedAlpha>(),
     Entry::of::<AlphaToCoverage>(),
