@@ -9,8 +9,6 @@ use fearless_simd::{Level, dispatch};
 use crate::trace::batch::Batch;
 use crate::trace::cells::{Cells, ChannelColumn, CoverageColumn};
 use crate::trace::column::{Column, Native};
-#[cfg(test)]
-use crate::trace::columns::ColumnId;
 use crate::trace::columns::{ColumnSet, columns, with_probe};
 use crate::trace::fragment::{Fragment, SampleMask};
 
@@ -100,7 +98,7 @@ macro_rules! blocks {
                 $(batch.$name.copy(from, &mut self.$name, mask);)*
                 $(
                     let column = batch.$oname.as_ref();
-                    let column = column.filter(|_| columns.contains(ColumnId::$oid));
+                    let column = column.filter(|_| columns.contains(crate::trace::columns::ColumnId::$oid));
                     match (column, &mut self.$oname) {
                         (Some(column), values) => {
                             let room = || Box::new([$default; BLOCK + STRETCH]);
@@ -263,7 +261,7 @@ mod tests {
     use crate::random::Stream;
     use crate::trace::batch::BatchBuilder;
     use crate::trace::{
-        ColourFormat, DepthPlane, Header, OptionalValues, SamplePattern, Scalar, Unorm32,
+        ColourFormat, ColumnId, DepthPlane, Header, OptionalValues, SamplePattern, Scalar, Unorm32,
     };
 
     /// A batch of random fragments, with columns of all types: masks for so many samples,
@@ -312,7 +310,10 @@ mod tests {
                 alpha: if constants { 0.25 } else { random.unit() },
                 primitive: random.word(),
                 object: random.word(),
-                optional: OptionalValues { probe: if optional { random.unit() } else { 0.5 } },
+                optional: OptionalValues {
+                    probe: if optional { random.unit() } else { 0.5 },
+                    ..OptionalValues::default()
+                },
             };
             builder.push(&fragment).unwrap();
         }
