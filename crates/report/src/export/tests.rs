@@ -23,6 +23,7 @@ fn records() -> Vec<Record> {
     records[2].covered.rmse =
         Estimate { low: f64::NEG_INFINITY, high: f64::INFINITY, ..exactly(3.5) };
     records[2].fine = exactly(0.1 + 0.2);
+    records[2].blocks = Some(exactly(0.25));
     records[3].events.hashes = u64::MAX;
     let gpu = records[3].speed.get_mut("gpu").unwrap();
     gpu.kernel = Some(Spread { low: 1e-9, median: 2e-7, high: 0.3 });

@@ -12,4 +12,5 @@ pub mod record;
 pub mod results;
 pub mod run;
 pub mod stress;
+mod subject;
 pub mod throughput;
