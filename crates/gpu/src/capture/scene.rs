@@ -155,7 +155,7 @@ impl<'a> GpuCapture<'a> {
             next = end;
             Ok(())
         })?;
-        compare(next..drawing.len(), &pending);
+        compare(next..drawing.triangles(), &pending);
         Ok(check)
     }
 
@@ -169,7 +169,7 @@ impl<'a> GpuCapture<'a> {
     ) -> Result<()> {
         let size = [self.options.width, self.options.height];
         let rasteriser = Rasteriser::new(self.gpu, size, self.capacity)?;
-        let total = drawing.len();
+        let total = drawing.triangles();
         for start in (0..total).step_by(CHUNK) {
             let end = (start + CHUNK).min(total);
             let corners = |i| {

@@ -32,7 +32,7 @@ impl Frame {
     /// The frame of a replay of `trace` at `samples` samples; that there are opaque
     /// fragments is taken for granted, as is that nobody asks for the primitives' depths
     /// or for optional columns:
-    /// [`screendoor_designs::Configured::frame`] finds out.
+    /// `Configured::frame` of the designs finds out.
     ///
     /// # Errors
     /// As [`screendoor_trace::trace::SamplePattern::prefix`].

@@ -44,7 +44,7 @@ impl Capture<'_> {
 
 impl Drawing<'_> {
     /// How many triangles there are.
-    pub fn len(&self) -> usize {
+    pub fn triangles(&self) -> usize {
         self.geometry.len() as usize
     }
 

@@ -69,7 +69,7 @@ fn a_constant_column_is_stated_once() {
 
 #[test]
 fn what_the_header_does_not_name_is_not_lost_in_silence() {
-    let error = write(header(), &fragments(|x| f32::from(x))).unwrap_err().to_string();
+    let error = write(header(), &fragments(f32::from)).unwrap_err().to_string();
     assert!(error.contains("row 0") && error.contains("'probe'"), "{error}");
     let mut header = header();
     header.constants.insert(ColumnId::Probe, Scalar::Real(1.0));
