@@ -97,9 +97,8 @@ macro_rules! blocks {
                 let from = Stretches { at: self.len, list };
                 $(batch.$name.copy(from, &mut self.$name, mask);)*
                 $(
-                    let column = batch.$oname.as_ref();
-                    let column = column.filter(|_| columns.contains(crate::trace::columns::ColumnId::$oid));
-                    match (column, &mut self.$oname) {
+                    let read = columns.contains(crate::trace::columns::ColumnId::$oid);
+                    match (batch.$oname.as_ref().filter(|_| read), &mut self.$oname) {
                         (Some(column), values) => {
                             let room = || Box::new([$default; BLOCK + STRETCH]);
                             column.copy(from, values.get_or_insert_with(room), mask);
