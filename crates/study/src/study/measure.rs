@@ -302,7 +302,7 @@ mod tests {
 
     fn subject() -> Subject {
         let options =
-            CaptureOptions { width: 24, height: 20, samples: 8, ..CaptureOptions::default() };
+            CaptureOptions { width: 24, height: 20, samples: 64, ..CaptureOptions::default() };
         let scene = scene::load("builtin:cloth").unwrap();
         let trace = Capture::new(&scene, &options).unwrap().to_memory(|_, _| ()).unwrap();
         Subject::new("cloth", trace, None, 1 << 28).unwrap()
