@@ -190,7 +190,6 @@ const TOLD: &[(&str, Told)] = &[
     ("exact", told::<designs::Exact>),
     ("lk", told::<designs::LaineKarras>),
     ("systematic", told::<designs::Systematic>),
-    ("residual", told::<designs::Residual>),
     ("enderton", told::<designs::Enderton>),
     ("hashed-alpha", told::<designs::HashedAlpha>),
     ("alpha-to-coverage", told::<designs::AlphaToCoverage>),

@@ -22,7 +22,6 @@ mod kbuffer;
 mod lk;
 mod mboit;
 mod mlab;
-mod residual;
 mod slab;
 mod sorted_blend;
 mod systematic;
@@ -41,7 +40,6 @@ pub use kbuffer::KBuffer;
 pub use lk::LaineKarras;
 pub use mboit::MomentBased;
 pub use mlab::Mlab;
-pub use residual::Residual;
 pub use slab::Slab;
 pub use sorted_blend::SortedBlend;
 pub use systematic::Systematic;
@@ -59,7 +57,6 @@ pub static DESIGNS: &[Entry] = &[
     Entry::of::<Exact>(),
     Entry::of::<LaineKarras>(),
     Entry::of::<Systematic>(),
-    Entry::of::<Residual>(),
     Entry::of::<Enderton>(),
     Entry::of::<HashedAlpha>(),
     Entry::of::<AlphaToCoverage>(),

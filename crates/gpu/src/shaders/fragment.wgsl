@@ -18,11 +18,15 @@ fn fragment(row: u32) -> Fragment {
         column_z(row),
         column_dzdx(row),
         column_dzdy(row),
-        vec3<f32>(column_r(row), column_g(row), column_b(row)),
+        colour(row),
         column_alpha(row),
         column_primitive(row),
         column_object(row),
     );
+}
+
+fn colour(row: u32) -> vec3<f32> {
+    return vec3<f32>(column_r(row), column_g(row), column_b(row));
 }
 
 // The samples of the frame that a fragment covers.
