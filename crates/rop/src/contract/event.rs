@@ -54,7 +54,7 @@ pub enum Event<'a> {
 /// There is one method, without a default, so that nobody forgets an event:
 ///
 /// ```
-/// use screendoor::rop::{Event, Listen, Probe};
+/// use screendoor_rop::{Event, Listen, Probe};
 ///
 /// struct Hashes(u32);
 ///
@@ -78,7 +78,7 @@ pub enum Event<'a> {
 /// One that leaves a kind of event out does not compile:
 ///
 /// ```compile_fail,E0004
-/// use screendoor::rop::{Event, Listen};
+/// use screendoor_rop::{Event, Listen};
 ///
 /// struct Hashes(u32);
 ///
@@ -100,7 +100,7 @@ pub enum Event<'a> {
 /// ```compile_fail,E0046
 /// struct Deaf;
 ///
-/// impl screendoor::rop::Listen for Deaf {}
+/// impl screendoor_rop::Listen for Deaf {}
 /// ```
 pub trait Listen {
     /// Whether anybody is told: where not, nothing need be worked out for it.
@@ -115,7 +115,7 @@ pub trait Listen {
 /// its way:
 ///
 /// ```compile_fail,E0119
-/// use screendoor::rop::{Event, Listen, Probe};
+/// use screendoor_rop::{Event, Listen, Probe};
 ///
 /// struct Forgetful;
 ///
