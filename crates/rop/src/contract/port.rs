@@ -2,15 +2,16 @@
 //! constants, how a pixel's state lies in words, and the way back from those words to
 //! the pixel of the plain text, which resolves and explains it.
 
-use crate::contract::shader::Shader;
-use crate::contract::words::{Constant, Declaration, Field, OnDevice, PixelWords, TileWords};
 use std::fmt;
 
 use crate::contract::design::Design;
 use crate::contract::engine::{Engine, TileState, sites};
 use crate::contract::frame::Frame;
 use crate::contract::info::Info;
-use crate::contract::words::Ranks;
+use crate::contract::shader::Shader;
+use crate::contract::words::{
+    Constant, Declaration, Field, OnDevice, PixelWords, Ranks, TileWords,
+};
 use screendoor_trace::param::{Kind, Param, Value, Values};
 use screendoor_trace::tile::{TileGrid, TileId};
 

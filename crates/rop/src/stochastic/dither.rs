@@ -1,10 +1,10 @@
 //! One number ξ in [0, 1) for each pixel and surface, even over the surface's
 //! neighbouring pixels: dithering.
 
-use crate::contract::words::{Ranks, TILE};
 use std::sync::LazyLock;
 
 use crate::contract::frame::Site;
+use crate::contract::words::{Ranks, TILE};
 use crate::stochastic::methods::Round;
 use crate::stochastic::pixel_order::PixelIndex;
 use crate::stochastic::reference_value::{Reference, ReferenceKey};
