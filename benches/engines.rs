@@ -10,7 +10,7 @@ use common::{Work, assert_same, binned, captured, draw_all, engines, in_file};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use rayon::ThreadPoolBuilder;
 use screendoor::design::{REFERENCE, configure};
-use screendoor::rop::{ReplayOptions, Which};
+use screendoor::rop::{Implementation, ReplayOptions};
 use screendoor::trace::WriteOptions;
 
 const SCENE: &str = "builtin:engine";
@@ -22,9 +22,9 @@ fn bench(c: &mut Criterion, name: &str, counts: &[u32], works: &[(&str, Work)]) 
     for samples in counts {
         let frame = design.frame(&trace, *samples, 1).expect("it has the samples");
         let (tiles, fragments) = binned(&trace, &frame);
-        let reference = design.build(&frame, Which::Reference).expect("it is built");
-        for (label, which) in engines() {
-            let engine = design.build(&frame, which).expect("it is built");
+        let reference = design.build(&frame, Implementation::Reference).expect("it is built");
+        for (label, implementation) in engines() {
+            let engine = design.build(&frame, implementation).expect("it is built");
             assert_same(&*engine, &*reference, &frame, &tiles);
             for (part, work) in works {
                 let mut group = c.benchmark_group(format!("{part}/{name}/{samples}"));
@@ -52,8 +52,10 @@ fn replay(c: &mut Criterion) {
     let design = configure("lk", &[]).expect("defaults are good");
     for threads in [1, 2] {
         let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-        for (label, which) in [("reference", Which::Reference), ("fast", Which::Fast)] {
-            let options = ReplayOptions { engine: which, ..ReplayOptions::default() };
+        for (label, implementation) in
+            [("reference", Implementation::Reference), ("fast", Implementation::Fast)]
+        {
+            let options = ReplayOptions { implementation, ..ReplayOptions::default() };
             let run = || design.replay(&trace, 8, 1, &options).expect("it replays");
             group.bench_function(format!("{label}, threads: {threads}"), |b| {
                 b.iter(|| pool.install(run));

@@ -17,7 +17,7 @@ use common::{Tile, Work, assert_same, binned, captured, draw_all, in_file};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use screendoor::capture::{Capture, CaptureOptions};
 use screendoor::design::{Configured, REFERENCE, configure};
-use screendoor::rop::{Engine, Frame, ReplayOptions, Which};
+use screendoor::rop::{Frame, Implementation, ReplayOptions, TiledDesign};
 use screendoor::tile::TILE_PIXELS;
 use screendoor::trace::{Trace, TraceWriter, WriteOptions};
 
@@ -65,8 +65,8 @@ fn low(what: &'static str, least: f64, aim: f64, found: Vec<f64>) -> Row {
 
 /// A design's engines and what they draw.
 struct Kernel {
-    fast: Box<dyn Engine>,
-    reference: Box<dyn Engine>,
+    fast: Box<dyn TiledDesign>,
+    reference: Box<dyn TiledDesign>,
     frame: Frame,
     tiles: Vec<Tile>,
     fragments: usize,
@@ -77,7 +77,7 @@ impl Kernel {
         let design = design(name);
         let frame = design.frame(trace, samples, 1).expect("it has the samples");
         let build = |which| design.build(&frame, which).expect("it is built");
-        let (fast, reference) = (build(Which::Fast), build(Which::Reference));
+        let (fast, reference) = (build(Implementation::Fast), build(Implementation::Reference));
         let (tiles, fragments) = binned(trace, &frame);
         assert_same(&*fast, &*reference, &frame, &tiles);
         Kernel { fast, reference, frame, tiles, fragments }

@@ -14,7 +14,7 @@ use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
 use screendoor::picture::TilePixels;
 use screendoor::rop::{
-    Contents, Engine, Frame, Layout, ReplayOptions, Replayed, TileState, Told, replay,
+    Contents, Frame, Layout, Listener, ReplayOptions, Replayed, TileState, TiledDesign, replay,
 };
 use screendoor::tile::{TILE_PIXELS, TileGrid, TileId};
 use screendoor::trace::{Block, Trace};
@@ -27,7 +27,7 @@ const SAMPLES: u32 = 8;
 /// Counts a tile's fragments.
 struct Counting;
 
-impl Engine for Counting {
+impl TiledDesign for Counting {
     fn passes(&self) -> u32 {
         1
     }
@@ -44,7 +44,7 @@ impl Engine for Counting {
         Box::new([0_u64; 2])
     }
 
-    fn draw(&self, _: u32, state: &mut TileState, fragments: &Block, _: Told<'_>) {
+    fn draw(&self, _: u32, state: &mut TileState, fragments: &Block, _: Listener<'_>) {
         let [count, bits] = state.downcast_mut::<[u64; 2]>().expect("it is this engine's own");
         // Every fragment is looked at, as a design would.
         for fragment in fragments.iter() {
@@ -53,7 +53,7 @@ impl Engine for Counting {
         }
     }
 
-    fn end_pass(&self, _: u32, _: TileGrid, _: TileId, _: &mut TileState, _: Told<'_>) {}
+    fn end_pass(&self, _: u32, _: TileGrid, _: TileId, _: &mut TileState, _: Listener<'_>) {}
 
     fn resolve(&self, _: TileGrid, _: TileId, state: &TileState) -> TilePixels {
         let [count, bits] = state.downcast_ref::<[u64; 2]>().expect("it is this engine's own");

@@ -14,7 +14,7 @@ use rayon::ThreadPoolBuilder;
 use screendoor::capture::{Capture, CaptureOptions};
 use screendoor::design::DESIGNS;
 use screendoor::error::Result;
-use screendoor::rop::{ReplayOptions, Replayed, Which};
+use screendoor::rop::{Implementation, ReplayOptions, Replayed};
 use screendoor::trace::{Compression, Trace};
 
 /// The trace that is timed, and the scene it is made of (`traces/README.md`).
@@ -72,13 +72,13 @@ fn replay(c: &mut Criterion) {
         let design = entry.configure(&[]).expect("defaults are good");
         for samples in [4, 8, 16, 64] {
             let name = entry.info.name;
-            let with = |engine| {
-                let options = ReplayOptions { engine, ..ReplayOptions::default() };
+            let with = |implementation| {
+                let options = ReplayOptions { implementation, ..ReplayOptions::default() };
                 design.replay(&trace, samples, SEED, &options)
             };
-            let run = || with(Which::Fast);
+            let run = || with(Implementation::Fast);
             let picture = |run: Result<Replayed>| run.expect("it replays").picture.hash();
-            let expected = picture(with(Which::Reference));
+            let expected = picture(with(Implementation::Reference));
             assert_eq!(picture(run()), expected, "{name} at {samples} is not the plain text");
             for threads in if threads > 1 { vec![1, threads] } else { vec![1] } {
                 let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use screendoor::capture::{Capture, CaptureOptions};
 use screendoor::param::Options;
-use screendoor::rop::{Engine, EventCounts, Frame, TileState, Told, Which};
+use screendoor::rop::{EventCounts, Frame, Implementation, Listener, TileState, TiledDesign};
 use screendoor::tile::TileId;
 use screendoor::trace::{Block, Compression, SampleMask, Trace, TraceWriter, WriteOptions};
 
@@ -88,7 +88,7 @@ pub enum Work {
 /// Draws a tile; the time that it took. A replay has just copied a block when it is drawn:
 /// here, too, it is copied first, which is not timed.
 pub fn draw(
-    engine: &dyn Engine,
+    engine: &dyn TiledDesign,
     frame: &Frame,
     (tile, blocks): &Tile,
     work: Work,
@@ -103,15 +103,15 @@ pub fn draw(
             near.clone_from(block);
             let near = black_box(&near);
             let told = match work {
-                Work::Count => Told::Counts(&mut events),
-                Work::Draw | Work::Picture => Told::Nobody,
+                Work::Count => Listener::Counts(&mut events),
+                Work::Draw | Work::Picture => Listener::Nobody,
             };
             let start = Instant::now();
             engine.draw(pass, &mut state, near, told);
             time += start.elapsed();
         }
         let start = Instant::now();
-        engine.end_pass(pass, frame.grid, *tile, &mut state, Told::Nobody);
+        engine.end_pass(pass, frame.grid, *tile, &mut state, Listener::Nobody);
         time += start.elapsed();
     }
     if work == Work::Picture {
@@ -124,12 +124,12 @@ pub fn draw(
 }
 
 /// The time that all tiles take, one after the other.
-pub fn draw_all(engine: &dyn Engine, frame: &Frame, tiles: &[Tile], work: Work) -> Duration {
+pub fn draw_all(engine: &dyn TiledDesign, frame: &Frame, tiles: &[Tile], work: Work) -> Duration {
     tiles.iter().map(|tile| black_box(draw(engine, frame, tile, work)).1).sum()
 }
 
 /// Panics where two engines do not agree to the last bit.
-pub fn assert_same(a: &dyn Engine, b: &dyn Engine, frame: &Frame, tiles: &[Tile]) {
+pub fn assert_same(a: &dyn TiledDesign, b: &dyn TiledDesign, frame: &Frame, tiles: &[Tile]) {
     for tile in tiles {
         let [a, b] = [a, b].map(|engine| {
             let (state, _) = draw(engine, frame, tile, Work::Draw);
@@ -141,9 +141,14 @@ pub fn assert_same(a: &dyn Engine, b: &dyn Engine, frame: &Frame, tiles: &[Tile]
 
 /// The engines that this machine can run, but for the portable one, which is slower than the
 /// reference.
-pub fn engines() -> impl Iterator<Item = (&'static str, Which)> {
-    let all = Which::CHOICES.iter().zip(Which::ALL).map(|(choice, which)| (choice.name, *which));
-    all.filter(|(_, which)| which.level().is_ok() && *which != Which::Portable)
+pub fn engines() -> impl Iterator<Item = (&'static str, Implementation)> {
+    let all = Implementation::CHOICES
+        .iter()
+        .zip(Implementation::ALL)
+        .map(|(choice, implementation)| (choice.name, *implementation));
+    all.filter(|(_, implementation)| {
+        implementation.level().is_ok() && *implementation != Implementation::Portable
+    })
 }
 
 /// What is read when the machine's memory is measured: more than the caches hold.

@@ -168,12 +168,12 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         },
     };
     let write = WriteOptions { compression: arguments.compress, ..WriteOptions::default() };
-    let told = Told { scene: &scene, unseen: true, strict: arguments.strict };
+    let reporting = Reporting { scene: &scene, unseen: true, strict: arguments.strict };
     let ((written, unseen), differences) = match &gpu {
-        None => (told.record(&Capture::new(&scene, &options)?, write, file, console)?, None),
+        None => (reporting.record(&Capture::new(&scene, &options)?, write, file, console)?, None),
         Some(gpu) => {
             let capture = GpuCapture::new(gpu, &scene, &options)?;
-            let recorded = told.record(&capture, write, file, console)?;
+            let recorded = reporting.record(&capture, write, file, console)?;
             let found = arguments.check.then(|| cross_check(&capture, console)).transpose()?;
             (recorded, found)
         }
@@ -214,8 +214,10 @@ pub(super) fn record(
     file: OutputFile,
     console: &Console,
 ) -> Result<Written> {
-    let told = Told { scene, unseen: false, strict: false };
-    told.record(&Capture::new(scene, options)?, write, file, console).map(|(written, _)| written)
+    let reporting = Reporting { scene, unseen: false, strict: false };
+    reporting
+        .record(&Capture::new(scene, options)?, write, file, console)
+        .map(|(written, _)| written)
 }
 
 /// What a trace is recorded from: our own rasteriser or a GPU's.
@@ -258,7 +260,7 @@ recording!(Capture, GpuCapture);
 const MOST_UNSEEN: usize = 20;
 
 /// What is told of a capture.
-struct Told<'a> {
+struct Reporting<'a> {
     scene: &'a Scene,
     /// Whether objects without fragments are.
     unseen: bool,
@@ -269,7 +271,7 @@ struct Told<'a> {
 /// What was written, and the objects that left nothing.
 type Recorded = (Written, Vec<Unseen>);
 
-impl Told<'_> {
+impl Reporting<'_> {
     /// Writes what `capture` draws.
     fn record(
         &self,

@@ -9,7 +9,7 @@ use crate::cli::files::{JsonArgument, report};
 use crate::design::{Configured, DESIGNS, Entry};
 use crate::error::Result;
 use crate::param::{Kind, Options as _, Param};
-use crate::rop::{Family, Frame, Info, Layout, Promises, StateBits, Which};
+use crate::rop::{Family, Frame, Implementation, Info, Layout, Promises, StateBits};
 use crate::tile::TileGrid;
 
 /// List the designs with their citations and parameters
@@ -62,7 +62,7 @@ impl Needs {
             primitive_depths: Some(Arc::default()),
             columns: Default::default(),
         };
-        let engine = design.build(&frame, Which::Reference)?;
+        let engine = design.build(&frame, Implementation::Reference)?;
         let (state_bits, layout) = (engine.state_bits(), engine.layout());
         Ok(Needs { samples: SAMPLES, passes: engine.passes(), state_bits, layout })
     }

@@ -21,13 +21,13 @@ const UNKNOWN: Duration = Duration::from_secs(2);
 /// A progress bar, or a line now and then; it vanishes when it is dropped.
 pub(super) struct Progress {
     bar: ProgressBar,
-    told: Arc<Mutex<Told>>,
+    status: Arc<Mutex<Status>>,
     /// Ends the thread that writes lines.
     lines: Option<(Sender<()>, JoinHandle<()>)>,
 }
 
 /// What is told of the work.
-struct Told {
+struct Status {
     what: String,
     unit: String,
     done: u64,
@@ -35,7 +35,7 @@ struct Told {
     since: Instant,
 }
 
-impl Told {
+impl Status {
     fn line(&self) -> String {
         let mut line = format!("screendoor: {}", shown(&self.what));
         if self.total > 0 {
@@ -46,8 +46,8 @@ impl Told {
     }
 }
 
-fn locked(told: &Mutex<Told>) -> MutexGuard<'_, Told> {
-    told.lock().unwrap_or_else(PoisonError::into_inner)
+fn locked(status: &Mutex<Status>) -> MutexGuard<'_, Status> {
+    status.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Progress {
@@ -78,7 +78,7 @@ impl Progress {
             // Long steps show that time passes.
             bar.enable_steady_tick(Duration::from_millis(250));
         }
-        let told = Arc::new(Mutex::new(Told {
+        let status = Arc::new(Mutex::new(Status {
             what: what.to_string(),
             unit: unit.to_string(),
             done: 0,
@@ -87,11 +87,11 @@ impl Progress {
         }));
         let lines = say.and_then(|say| {
             let (end, ended) = channel();
-            let told = told.clone();
+            let status = status.clone();
             let write = move || {
                 let mut wait = first;
                 while ended.recv_timeout(wait) == Err(RecvTimeoutError::Timeout) {
-                    let line = locked(&told).line();
+                    let line = locked(&status).line();
                     say(&line);
                     wait = every;
                 }
@@ -100,21 +100,21 @@ impl Progress {
             let thread = std::thread::Builder::new().name("progress".to_string()).spawn(write);
             thread.ok().map(|thread| (end, thread))
         });
-        Progress { bar, told, lines }
+        Progress { bar, status, lines }
     }
 
     /// Shows that `done` of `total` is done.
     pub fn set(&self, done: u64, total: u64) {
         let begins = {
-            let mut told = locked(&self.told);
-            let begins = told.total == 0 && total > 0;
-            (told.done, told.total) = (done, total);
+            let mut status = locked(&self.status);
+            let begins = status.total == 0 && total > 0;
+            (status.done, status.total) = (done, total);
             begins
         };
         self.bar.set_length(total);
         self.bar.set_position(done);
         if begins {
-            let unit = &locked(&self.told).unit;
+            let unit = &locked(&self.status).unit;
             // What is named is shortened where there is no room: the line never wraps.
             self.bar.set_style(style(&format!(
                 "{{wide_msg}} [{{bar:8}}] {{human_pos}} of {{human_len}} {unit}{{left}}"
@@ -126,7 +126,7 @@ impl Progress {
 
     /// Shows another name for what is done.
     pub fn name(&self, what: &str) {
-        locked(&self.told).what = what.to_string();
+        locked(&self.status).what = what.to_string();
         self.bar.set_message(what.to_string());
     }
 }

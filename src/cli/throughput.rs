@@ -10,7 +10,7 @@ use crate::cli::console::{Console, grouped, shown, table};
 use crate::cli::files::{JsonArgument, check, open_trace, report};
 use crate::error::Result;
 use crate::gpu::{Adapter, Threads};
-use crate::rop::Which;
+use crate::rop::Implementation;
 use crate::study::engine::EngineName;
 use crate::study::machine::processor;
 use crate::study::throughput::{Plan, Spread, Throughput, measure};
@@ -109,7 +109,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
 /// The engines where none are named: a machine without a GPU is no mistake of the user's,
 /// unless one was named.
 fn usual_engines(adapter: Option<&str>, console: &Console) -> Result<Vec<EngineName>> {
-    let fast = EngineName::Cpu(Which::Fast);
+    let fast = EngineName::Cpu(Implementation::Fast);
     match (EngineName::Gpu.open(adapter), adapter) {
         (Ok(_), _) => Ok(vec![fast, EngineName::Gpu]),
         (Err(error), Some(_)) => Err(error),

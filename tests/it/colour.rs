@@ -4,7 +4,7 @@ use screendoor::design::{Configured, DESIGNS, Entry};
 use screendoor::gpu::Threads;
 use screendoor::picture::Picture;
 use screendoor::rop::colour::PARAM;
-use screendoor::rop::{Frame, ReplayOptions, StateBits, Which, replay};
+use screendoor::rop::{Frame, Implementation, ReplayOptions, StateBits, replay};
 use screendoor::trace::{ColourFormat, DepthPlane, Fragment, Header, SampleMask, Trace, Unorm32};
 
 use crate::gpu::check;
@@ -44,8 +44,8 @@ fn bits(picture: &Picture) -> String {
     picture.hash()
 }
 
-fn drawn(design: &Configured, trace: &Trace, engine: Which) -> String {
-    let options = ReplayOptions { engine, ..ReplayOptions::default() };
+fn drawn(design: &Configured, trace: &Trace, implementation: Implementation) -> String {
+    let options = ReplayOptions { implementation, ..ReplayOptions::default() };
     bits(&design.replay(trace, 4, 3, &options).unwrap().picture)
 }
 
@@ -138,11 +138,11 @@ fn samples_of_what_the_trace_stores_change_no_bit() {
     for name in ["lk", "systematic", "enderton", "hashed-alpha", "alpha-to-coverage"] {
         let pictures: Vec<String> = ["trace", "16", "32"]
             .iter()
-            .map(|w| drawn(&design(&format!("{name}:colour={w}")), &trace, Which::Fast))
+            .map(|w| drawn(&design(&format!("{name}:colour={w}")), &trace, Implementation::Fast))
             .collect();
         assert_eq!(pictures[0], pictures[1], "{name}");
         assert_eq!(pictures[0], pictures[2], "{name}");
-        let bytes = drawn(&design(&format!("{name}:colour=8")), &trace, Which::Fast);
+        let bytes = drawn(&design(&format!("{name}:colour=8")), &trace, Implementation::Fast);
         assert_ne!(pictures[0], bytes, "{name}");
     }
 }
@@ -154,13 +154,23 @@ fn every_design_rounds_and_every_engine_alike() {
         for plain in variants(entry) {
             let pictures = WIDTHS.map(|width| {
                 let design = at_width(&plain, width);
-                let found = drawn(&design, &trace, Which::Reference);
-                assert_eq!(found, drawn(&design, &trace, Which::Fast), "{}", design.label());
+                let found = drawn(&design, &trace, Implementation::Reference);
+                assert_eq!(
+                    found,
+                    drawn(&design, &trace, Implementation::Fast),
+                    "{}",
+                    design.label()
+                );
                 found
             });
             assert_ne!(pictures[0], pictures[1], "{}", plain.label());
             assert_ne!(pictures[1], pictures[2], "{}", plain.label());
-            assert_eq!(pictures[2], drawn(&plain, &trace, Which::Fast), "{}", plain.label());
+            assert_eq!(
+                pictures[2],
+                drawn(&plain, &trace, Implementation::Fast),
+                "{}",
+                plain.label()
+            );
         }
     }
 }
@@ -219,7 +229,7 @@ fn scenes_without_opaque_fragments_do_not_pay_for_them() {
             let dear = design.replay(&with, 4, 3, &options).unwrap();
             // The same trace, but nobody knows that nothing in it is opaque.
             let frame = Frame { opaque: true, ..design.frame(&without, 4, 3).unwrap() };
-            let engine = design.build(&frame, Which::Fast).unwrap();
+            let engine = design.build(&frame, Implementation::Fast).unwrap();
             let unknown = replay(&*engine, &frame, &without, &options).unwrap();
             assert_eq!(bits(&cheap.picture), bits(&unknown.picture), "{label}");
             assert_eq!((unknown.passes, unknown.state_bits), (dear.passes, dear.state_bits));

@@ -6,7 +6,8 @@ use std::collections::BTreeMap;
 use screendoor::design::{self as designs, Configured, DESIGNS};
 use screendoor::rop::layers::LAYERS;
 use screendoor::rop::{
-    Blueprint, Design, Event, EventCounts, Frame, Listen, Probe, ReplayOptions, Site, Which,
+    Blueprint, Design, Event, EventCounts, Frame, Implementation, Listen, Probe, ReplayOptions,
+    Site,
 };
 use screendoor::trace::{DepthPlane, Fragment, SampleMask, Trace, Unorm32};
 
@@ -33,12 +34,13 @@ fn pixel(fragments: &[Fragment]) -> Trace {
 
 /// The counts of a design, and the same for each of its engines.
 fn events(spec: &str, trace: &Trace) -> EventCounts {
-    let count = |engine| {
-        let options = ReplayOptions { count_events: true, engine, ..ReplayOptions::default() };
+    let count = |implementation| {
+        let options =
+            ReplayOptions { count_events: true, implementation, ..ReplayOptions::default() };
         design(spec).replay(trace, trace.header().pattern.samples(), 0, &options).unwrap().events
     };
-    let plain = count(Which::Reference);
-    assert_eq!(plain, count(Which::Fast), "{spec}");
+    let plain = count(Implementation::Reference);
+    assert_eq!(plain, count(Implementation::Fast), "{spec}");
     plain.unwrap()
 }
 
@@ -220,9 +222,12 @@ fn the_replay_passes_on_what_designs_tell() {
         for design in variants(entry) {
             let label = design.label();
             let direct = told(&design, &trace, false);
-            for engine in [Which::Reference, Which::Fast] {
-                let options =
-                    ReplayOptions { count_events: true, engine, ..ReplayOptions::default() };
+            for implementation in [Implementation::Reference, Implementation::Fast] {
+                let options = ReplayOptions {
+                    count_events: true,
+                    implementation,
+                    ..ReplayOptions::default()
+                };
                 let counted = design.replay(&trace, 4, 3, &options).unwrap().events.unwrap();
                 assert_eq!(counted, direct, "{label}");
             }

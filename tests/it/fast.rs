@@ -3,17 +3,19 @@
 use screendoor::design::{Configured, DESIGNS};
 use screendoor::param::Options;
 use screendoor::random::Stream;
-use screendoor::rop::{EventCounts, Frame, Site, Told, Which};
+use screendoor::rop::{EventCounts, Frame, Implementation, Listener, Site};
 use screendoor::tile::{TileGrid, TileId};
 use screendoor::trace::{Block, DepthPlane, Fragment, Header, SampleMask, Unorm32};
 
 use crate::util::{header, trace, variants};
 
 /// The engines that this machine can run, but for the reference.
-fn engines() -> Vec<Which> {
+fn engines() -> Vec<Implementation> {
     // `Fast` is one of the others.
-    let own = |which: &Which| *which != Which::Fast && matches!(which.level(), Ok(Some(_)));
-    Which::ALL.iter().copied().filter(own).collect()
+    let own = |implementation: &Implementation| {
+        *implementation != Implementation::Fast && matches!(implementation.level(), Ok(Some(_)))
+    };
+    Implementation::ALL.iter().copied().filter(own).collect()
 }
 
 /// Fragments that crowd a few pixels of one tile: depths from a handful of levels or
@@ -72,10 +74,10 @@ pub fn crowd(header: &Header, count: usize, seed: u32) -> Vec<Fragment> {
 fn run(
     design: &Configured,
     frame: &Frame,
-    which: Which,
+    implementation: Implementation,
     fragments: &[Fragment],
 ) -> (Vec<screendoor::rop::Contents>, EventCounts, Vec<[u64; 3]>) {
-    let engine = design.build(frame, which).unwrap();
+    let engine = design.build(frame, implementation).unwrap();
     let (grid, tile) = (frame.grid, TileId(0));
     let mut counts = EventCounts::default();
     let mut held = Vec::new();
@@ -85,11 +87,11 @@ fn run(
     for pass in 0..engine.passes() {
         // In two parts, as windows cut them.
         for part in fragments.chunks(fragments.len() / 2 + 1).flat_map(Block::all_of) {
-            engine.draw(pass, &mut counted, &part, Told::Counts(&mut counts));
-            engine.draw(pass, &mut uncounted, &part, Told::Nobody);
+            engine.draw(pass, &mut counted, &part, Listener::Counts(&mut counts));
+            engine.draw(pass, &mut uncounted, &part, Listener::Nobody);
         }
-        engine.end_pass(pass, grid, tile, &mut counted, Told::Counts(&mut counts));
-        engine.end_pass(pass, grid, tile, &mut uncounted, Told::Nobody);
+        engine.end_pass(pass, grid, tile, &mut counted, Listener::Counts(&mut counts));
+        engine.end_pass(pass, grid, tile, &mut uncounted, Listener::Nobody);
         for within in 0..5 {
             held.push(engine.contents(&counted, within));
             held.push(engine.contents(&uncounted, within));
@@ -110,13 +112,13 @@ fn check(name: &str, samples: u32, cases: u32) {
             let seed = case * 1000 + i as u32;
             let fragments = crowd(&header, 60, seed);
             let frame = design.frame(&empty, samples, seed).unwrap();
-            let expected = run(&design, &frame, Which::Reference, &fragments);
-            for which in engines() {
-                let found = run(&design, &frame, which, &fragments);
+            let expected = run(&design, &frame, Implementation::Reference, &fragments);
+            for implementation in engines() {
+                let found = run(&design, &frame, implementation, &fragments);
                 let label = design.label();
-                assert_eq!(found.0, expected.0, "{label} {which:?} {samples}: state");
-                assert_eq!(found.1, expected.1, "{label} {which:?} {samples}: events");
-                assert!(found.2 == expected.2, "{label} {which:?} {samples}: colours");
+                assert_eq!(found.0, expected.0, "{label} {implementation:?} {samples}: state");
+                assert_eq!(found.1, expected.1, "{label} {implementation:?} {samples}: events");
+                assert!(found.2 == expected.2, "{label} {implementation:?} {samples}: colours");
             }
         }
     }

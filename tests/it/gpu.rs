@@ -5,7 +5,7 @@ use screendoor::capture::{Capture, CaptureOptions};
 use screendoor::design::{Configured, DESIGNS};
 use screendoor::gpu::{self, Gpu, GpuOptions, GpuRun, Threads};
 use screendoor::picture::Picture;
-use screendoor::rop::{Contents, Frame, ReplayOptions, Told, Which};
+use screendoor::rop::{Contents, Frame, Implementation, Listener, ReplayOptions};
 use screendoor::tile::TileId;
 use screendoor::trace::{Block, ColourFormat, ColumnId, Fragment, Header, Scalar, Trace};
 
@@ -32,7 +32,7 @@ fn on_gpu(
 
 /// The same by the plain text.
 fn by_plain_text(design: &Configured, trace: &Trace, frame: &Frame) -> Found {
-    let engine = design.build(frame, Which::Reference).unwrap();
+    let engine = design.build(frame, Implementation::Reference).unwrap();
     let mut fragments: Vec<(TileId, Fragment)> = trace
         .batches()
         .flat_map(|batch| batch.unwrap().iter().collect::<Vec<_>>())
@@ -49,14 +49,15 @@ fn by_plain_text(design: &Configured, trace: &Trace, frame: &Frame) -> Found {
         let mut state = engine.clear(frame.grid, tile);
         for pass in 0..engine.passes() {
             for block in Block::all_of(&list) {
-                engine.draw(pass, &mut state, &block, Told::Nobody);
+                engine.draw(pass, &mut state, &block, Listener::Nobody);
             }
-            engine.end_pass(pass, frame.grid, tile, &mut state, Told::Nobody);
+            engine.end_pass(pass, frame.grid, tile, &mut state, Listener::Nobody);
         }
         (tile, (0..256).map(|i| engine.contents(&state, i)).collect())
     });
     let held = held.collect();
-    let options = ReplayOptions { engine: Which::Reference, ..ReplayOptions::default() };
+    let options =
+        ReplayOptions { implementation: Implementation::Reference, ..ReplayOptions::default() };
     let picture = design.replay(trace, frame.samples(), frame.seed, &options).unwrap().picture;
     (held, picture.hash())
 }

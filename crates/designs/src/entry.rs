@@ -7,8 +7,9 @@ use crate::DESIGNS;
 use screendoor_rop::fast::{Count, Width};
 use screendoor_rop::stochastic::draws_opaque_first;
 use screendoor_rop::{
-    Blueprint, Engine, ExplainLimits, Explanation, Frame, Info, Layout, Port, PrimitiveDepths,
-    Promises, ReplayOptions, Replayed, Site, StateBits, Which, explain, replay,
+    Blueprint, ExplainLimits, Explanation, Frame, Implementation, Info, Layout, Port,
+    PrimitiveDepths, Promises, ReplayOptions, Replayed, Site, StateBits, TiledDesign, explain,
+    replay,
 };
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::param::Values;
@@ -21,7 +22,7 @@ pub struct Entry {
     /// What a listing says about it.
     pub info: Info,
     promises: fn(&Values) -> Promises,
-    build: fn(&Values, &Frame, Which) -> Result<Box<dyn Engine>>,
+    build: fn(&Values, &Frame, Implementation) -> Result<Box<dyn TiledDesign>>,
     port: fn(&Values, &Frame) -> Result<Option<Port>>,
     ported: bool,
     /// Whether the frame must hold the primitives' mean depths.
@@ -55,12 +56,12 @@ impl Entry {
         fn build_at<B: Blueprint, const N: usize>(
             values: &Values,
             frame: &Frame,
-            which: Which,
-        ) -> Result<Box<dyn Engine>>
+            implementation: Implementation,
+        ) -> Result<Box<dyn TiledDesign>>
         where
             Count<N>: Width,
         {
-            let fast = match which.level()? {
+            let fast = match implementation.level()? {
                 Some(level) => B::fast::<N>(values, frame, level)?,
                 None => None,
             };
@@ -78,8 +79,8 @@ impl Entry {
         Entry {
             info: B::INFO,
             promises: B::promises,
-            build: |values, frame, which| {
-                for_samples!(frame.samples(), build_at::<B>(values, frame, which))
+            build: |values, frame, implementation| {
+                for_samples!(frame.samples(), build_at::<B>(values, frame, implementation))
             },
             port: |values, frame| for_samples!(frame.samples(), port_at::<B>(values, frame)),
             ported: B::PORTED,
@@ -161,7 +162,7 @@ impl Configured {
         options: &ReplayOptions<'_>,
     ) -> Result<Replayed> {
         let frame = self.frame_within(trace, samples, seed, options.memory)?;
-        replay(&*self.build(&frame, options.engine)?, &frame, trace, options)
+        replay(&*self.build(&frame, options.implementation)?, &frame, trace, options)
     }
 
     /// The design as a GPU runs it.
@@ -217,7 +218,14 @@ impl Configured {
                 format_args!("it is {}x{} pixels", frame.grid.width(), frame.grid.height()),
             ));
         }
-        explain(&*self.build(&frame, Which::Reference)?, &frame, trace, site, limits, progress)
+        explain(
+            &*self.build(&frame, Implementation::Reference)?,
+            &frame,
+            trace,
+            site,
+            limits,
+            progress,
+        )
     }
 
     /// What a pixel holds, at the sample count of `frame`.
@@ -225,7 +233,7 @@ impl Configured {
     /// # Errors
     /// As [`Blueprint::at`].
     pub fn layout(&self, frame: &Frame) -> Result<Layout> {
-        Ok(self.build(frame, Which::Reference)?.layout())
+        Ok(self.build(frame, Implementation::Reference)?.layout())
     }
 
     /// State per pixel at the sample count of `frame`.
@@ -233,7 +241,7 @@ impl Configured {
     /// # Errors
     /// As [`Blueprint::at`].
     pub fn state_bits(&self, frame: &Frame) -> Result<StateBits> {
-        Ok(self.build(frame, Which::Reference)?.state_bits())
+        Ok(self.build(frame, Implementation::Reference)?.state_bits())
     }
 
     /// The frame, with what the design asks to know of the whole trace beforehand.
@@ -270,7 +278,11 @@ impl Configured {
     ///
     /// # Errors
     /// As [`Blueprint::at`].
-    pub fn build(&self, frame: &Frame, which: Which) -> Result<Box<dyn Engine>> {
-        (self.entry.build)(&self.values, frame, which)
+    pub fn build(
+        &self,
+        frame: &Frame,
+        implementation: Implementation,
+    ) -> Result<Box<dyn TiledDesign>> {
+        (self.entry.build)(&self.values, frame, implementation)
     }
 }

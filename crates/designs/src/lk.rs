@@ -6,7 +6,7 @@
 use fearless_simd::Level;
 
 use screendoor_rop::fast::{
-    Count, FastEngine, FastTracked, Given, Published, PublishedHash, Width, is_published,
+    Count, FastEngine, FastTracked, Parameterised, Published, PublishedHash, Width, is_published,
 };
 use screendoor_rop::shader;
 use screendoor_rop::stochastic::{self, COMBINATIONS, METHOD, OPAQUE, ROUNDS, STRATA};
@@ -15,8 +15,8 @@ use screendoor_rop::tracked::{
     chance_decides_surfaces,
 };
 use screendoor_rop::{
-    Blueprint, Engine, Family, Frame, Info, OpaquePromise, OrderPromise, Port, Promise, Promises,
-    Reference, Stochastic, colour, depth_bits,
+    Blueprint, Family, Frame, Info, OpaquePromise, OrderPromise, Port, Promise, Promises,
+    Reference, Stochastic, TiledDesign, colour, depth_bits,
 };
 use screendoor_trace::error::Result;
 use screendoor_trace::param::Values;
@@ -59,7 +59,7 @@ impl Blueprint for LaineKarras {
         values: &Values,
         frame: &Frame,
         level: Level,
-    ) -> Result<Option<Box<dyn Engine>>>
+    ) -> Result<Option<Box<dyn TiledDesign>>>
     where
         Count<N>: Width,
     {
@@ -72,7 +72,7 @@ impl Blueprint for LaineKarras {
             return Ok(Some(Box::new(FastEngine::new(plain, sampler, level))));
         }
         let references = Hashed(values.get(REFERENCE));
-        let sampler = FastTracked::<_, _, N>::new(values, Given::of(values), references);
+        let sampler = FastTracked::<_, _, N>::new(values, Parameterised::of(values), references);
         Ok(Some(Box::new(FastEngine::new(plain, sampler, level))))
     }
 

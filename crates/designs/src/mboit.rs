@@ -90,7 +90,7 @@ pub struct MomentBasedAt<const N: usize> {
 
 /// What is kept of all fragments together.
 #[derive(Clone, Debug, Default)]
-pub struct Sums {
+pub struct MomentSums {
     /// The first pass's.
     moments: Moments,
     /// Σ α T c, of the second pass.
@@ -113,7 +113,7 @@ impl<const N: usize> MomentBasedAt<N> {
     }
 }
 
-impl Sums {
+impl MomentSums {
     /// What is seen of the fragments, and what of that behind them.
     fn layer(&self) -> ([f64; 3], f64) {
         let transmittance = libm::exp(-self.moments.total());
@@ -126,7 +126,7 @@ impl Sums {
 }
 
 impl<const N: usize> Transparent<N> for MomentBasedAt<N> {
-    type Pixel = Accumulators<Sums>;
+    type Pixel = Accumulators<MomentSums>;
 
     fn passes(&self) -> u32 {
         2
@@ -190,11 +190,11 @@ impl<const N: usize> Transparent<N> for MomentBasedAt<N> {
     }
 
     fn resolve(&self, _site: Site, pixel: &Self::Pixel, behind: &[[f32; 3]; N]) -> [f64; 3] {
-        pixel.over(behind, Sums::layer)
+        pixel.over(behind, MomentSums::layer)
     }
 
     fn contents(&self, pixel: &Self::Pixel) -> Contents {
-        let list = |value: fn(&Sums) -> f64| {
+        let list = |value: fn(&MomentSums) -> f64| {
             accumulators::list(pixel.get().iter().map(|s| value(s) as f32))
         };
         let fields = vec![

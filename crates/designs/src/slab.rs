@@ -40,8 +40,8 @@ use screendoor_rop::layers::{
 use screendoor_rop::shader;
 use screendoor_rop::{
     Blueprint, Contents, Declaration, Family, Frame, Info, Layout, Normalise, OnDevice,
-    OpaquePromise, OrderPromise, OverOpaque, PixelWords, Port, Probe, Promises, Site, Sums,
-    Threshold, Transparent, colour, over_opaque, random_subset, visible_independent,
+    OpaquePromise, OrderPromise, OverOpaque, PixelWords, Port, Probe, Promises, Site, Threshold,
+    Transparent, VisibilitySums, colour, over_opaque, random_subset, visible_independent,
     visible_stratified,
 };
 use screendoor_trace::error::Result;
@@ -203,7 +203,7 @@ impl Deep for SlabLayer {
 pub struct SlabPixel {
     /// From near to far.
     layers: Vec<SlabLayer>,
-    sums: Sums,
+    sums: VisibilitySums,
 }
 
 impl<const N: usize> SlabAt<N> {
@@ -463,8 +463,8 @@ impl<const N: usize> OnDevice<SlabPixel> for SlabAt<N> {
         SlabPixel {
             layers: layers::read(from).into_iter().map(layer).collect(),
             sums: match self.normalise {
-                Normalise::None => Sums::default(),
-                _ => Sums::read(self.normalise, from),
+                Normalise::None => VisibilitySums::default(),
+                _ => VisibilitySums::read(self.normalise, from),
             },
         }
     }

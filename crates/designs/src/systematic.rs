@@ -9,8 +9,8 @@
 use fearless_simd::{Level, Simd};
 
 use screendoor_rop::fast::{
-    Base, Count, FastEngine, FastReferences, FastTracked, Given, Lanes, Limit, Loaded, Numbered,
-    Published, Tally, Width, below, is_published,
+    Base, Count, FastEngine, FastReferences, FastTracked, Lanes, Limit, Loaded, Numbered,
+    Parameterised, Published, Tally, Width, below, is_published,
 };
 use screendoor_rop::shader;
 use screendoor_rop::stochastic::{self, COMBINATIONS, METHOD, OPAQUE, ROUNDS, STRATA};
@@ -19,9 +19,9 @@ use screendoor_rop::tracked::{
     TrackedSampler, chance_decides_surfaces,
 };
 use screendoor_rop::{
-    Blueprint, Declaration, Dither, Engine, Family, Frame, Info, OnDevice, OpaquePromise,
-    OrderPromise, PixelWords, Port, Probe, Promise, Promises, Reference, ReferenceKey, Round, Site,
-    Stochastic, colour, depth_bits,
+    Blueprint, Declaration, Dither, Family, Frame, Info, OnDevice, OpaquePromise, OrderPromise,
+    PixelWords, Port, Probe, Promise, Promises, Reference, ReferenceKey, Round, Site, Stochastic,
+    TiledDesign, colour, depth_bits,
 };
 use screendoor_trace::error::Result;
 use screendoor_trace::param::{Typed, Values};
@@ -78,7 +78,7 @@ impl Blueprint for Systematic {
         values: &Values,
         frame: &Frame,
         level: Level,
-    ) -> Result<Option<Box<dyn Engine>>>
+    ) -> Result<Option<Box<dyn TiledDesign>>>
     where
         Count<N>: Width,
     {
@@ -94,7 +94,7 @@ impl Blueprint for Systematic {
             let sampler = FastTracked::<_, _, N>::new(values, Published, Summed);
             return Ok(Some(Box::new(FastEngine::new(plain, sampler, level))));
         }
-        let sampler = FastTracked::<_, _, N>::new(values, Given::of(values), references);
+        let sampler = FastTracked::<_, _, N>::new(values, Parameterised::of(values), references);
         Ok(Some(Box::new(FastEngine::new(plain, sampler, level))))
     }
 

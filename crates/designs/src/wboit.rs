@@ -107,7 +107,7 @@ pub struct WeightedBlendedAt<const N: usize> {
 
 /// What is kept of all fragments together.
 #[derive(Clone, Debug)]
-pub struct Sums {
+pub struct WeightedSums {
     /// Σ w α c.
     colour: [f32; 3],
     /// Σ w α.
@@ -116,13 +116,13 @@ pub struct Sums {
     transmittance: f32,
 }
 
-impl Default for Sums {
+impl Default for WeightedSums {
     fn default() -> Self {
-        Sums { colour: [0.0; 3], weight: 0.0, transmittance: 1.0 }
+        WeightedSums { colour: [0.0; 3], weight: 0.0, transmittance: 1.0 }
     }
 }
 
-impl Sums {
+impl WeightedSums {
     /// What is seen of the fragments: their mean, by their opacity together.
     fn seen(&self) -> [f64; 3] {
         let opacity = 1.0 - f64::from(self.transmittance);
@@ -132,7 +132,7 @@ impl Sums {
 }
 
 impl<const N: usize> Transparent<N> for WeightedBlendedAt<N> {
-    type Pixel = Accumulators<Sums>;
+    type Pixel = Accumulators<WeightedSums>;
 
     fn layout(&self) -> Layout {
         let channel = self.store.channel_bits();
@@ -178,14 +178,15 @@ impl<const N: usize> Transparent<N> for WeightedBlendedAt<N> {
     }
 
     fn contents(&self, pixel: &Self::Pixel) -> Contents {
-        let list = |value: fn(&Sums) -> f32| accumulators::list(pixel.get().iter().map(value));
+        let list =
+            |value: fn(&WeightedSums) -> f32| accumulators::list(pixel.get().iter().map(value));
         let fields =
             vec![("weights", list(|s| s.weight)), ("transmittance", list(|s| s.transmittance))];
         Contents { samples: Vec::new(), fields }
     }
 }
 
-impl<const N: usize> OnDevice<Accumulators<Sums>> for WeightedBlendedAt<N> {
+impl<const N: usize> OnDevice<Accumulators<WeightedSums>> for WeightedBlendedAt<N> {
     fn declare(&self, to: &mut Declaration) {
         let sums = self.coverage.sums(N) as u32;
         to.field("TOUCHED", 1);
@@ -195,11 +196,11 @@ impl<const N: usize> OnDevice<Accumulators<Sums>> for WeightedBlendedAt<N> {
         to.iterations(sums);
     }
 
-    fn read(&self, _: Site, from: &PixelWords<'_>) -> Accumulators<Sums> {
+    fn read(&self, _: Site, from: &PixelWords<'_>) -> Accumulators<WeightedSums> {
         let mut colours = from.field("SUM_COLOUR").map(f32::from_bits);
         let values = |name| from.field(name).map(f32::from_bits);
         let sums = values("SUM_WEIGHT").zip(values("SUM_THROUGH"));
-        let sums = sums.map(|(weight, transmittance)| Sums {
+        let sums = sums.map(|(weight, transmittance)| WeightedSums {
             colour: std::array::from_fn(|_| colours.next().expect("three a sum")),
             weight,
             transmittance,

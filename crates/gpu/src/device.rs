@@ -1,11 +1,10 @@
 //! Finding a GPU, and talking to it without a panic.
 
-use std::collections::HashMap;
 use std::fmt;
-use std::sync::{Arc, Mutex};
-use std::time::Duration;
 
+use crate::guard::Guard;
 use crate::options::Adapter;
+use crate::program::Compiled;
 use screendoor_trace::error::{Error, Result};
 
 /// What to install where there is no adapter.
@@ -39,25 +38,14 @@ impl Adapter {
 
 /// A GPU that is open.
 ///
-/// What goes wrong on it is kept, and told by the next call that returns a [`Result`].
+/// What goes wrong on it is told by the call that asked for it.
 #[derive(Debug)]
 pub struct Gpu {
     pub(super) device: wgpu::Device,
     pub(super) queue: wgpu::Queue,
+    pub(super) programs: Compiled,
     adapter: Adapter,
-    fault: Arc<Mutex<Option<Fault>>>,
-    pipelines: Mutex<HashMap<(String, String), wgpu::ComputePipeline>>,
-}
-
-/// How long a device may take to say why it failed.
-const PATIENCE: Duration = Duration::from_secs(5);
-
-/// What went wrong.
-#[derive(Clone, Debug)]
-enum Fault {
-    Memory,
-    Lost(String),
-    Other(String),
+    guard: Guard,
 }
 
 impl Gpu {
@@ -105,23 +93,21 @@ impl Gpu {
         let (device, queue) = opened.map_err(|e| {
             Error::gpu(&adapter, format_args!("it cannot be opened: {e}"), "choose another")
         })?;
-        let fault = Arc::new(Mutex::new(None));
-        // The first is the cause of the others.
-        let keep = |fault: &Arc<Mutex<Option<Fault>>>, found| {
-            fault.lock().expect("no thread panicked").get_or_insert(found);
-        };
-        let kept = fault.clone();
-        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
-            let found = match error {
-                wgpu::Error::OutOfMemory { .. } => Fault::Memory,
-                other => Fault::Other(other.to_string()),
-            };
-            keep(&kept, found);
-        }));
-        let kept = fault.clone();
-        // One that is dropped is lost as well; then nobody asks any more.
-        device.set_device_lost_callback(move |_, why| keep(&kept, Fault::Lost(why)));
-        Ok(Gpu { device, queue, adapter, fault, pipelines: Mutex::default() })
+        let gpu = Self::of(adapter, device, queue);
+        gpu.guard.watch(&gpu.device);
+        Ok(gpu)
+    }
+
+    /// A device that its owner has opened and goes on using: an engine's own, say. Nothing
+    /// of it is changed: no handler of errors, no callback. Time stamps and subgroups are used
+    /// where it has these features, and chunks are as large as its limits allow.
+    pub fn from_device(adapter: &wgpu::Adapter, device: wgpu::Device, queue: wgpu::Queue) -> Self {
+        Self::of(Adapter::of(adapter), device, queue)
+    }
+
+    fn of(adapter: Adapter, device: wgpu::Device, queue: wgpu::Queue) -> Self {
+        let guard = Guard::new(&adapter);
+        Gpu { device, queue, programs: Compiled::default(), adapter, guard }
     }
 
     /// Gives the device up, as if the card had been taken out: whatever is asked of it from
@@ -152,47 +138,15 @@ impl Gpu {
 
     /// An error on this adapter.
     pub(super) fn error(&self, what: impl fmt::Display, hint: impl fmt::Display) -> Error {
-        Error::gpu(&self.adapter, what, hint)
+        self.guard.error(what, hint)
     }
 
-    /// Why memory could not be reached: what went wrong on the device, if it knows.
-    fn failed(&self, doing: &str, why: &dyn fmt::Display) -> Error {
-        // A device tells that it is lost when it is asked, and when its last work is over.
-        let wait = wgpu::PollType::Wait { submission_index: None, timeout: Some(PATIENCE) };
-        let polled = self.device.poll(wait);
-        let cause = self.check(doing).err();
-        cause.unwrap_or_else(|| match polled {
-            Err(e) => self.error(format_args!("{doing} failed: {e}"), "try again"),
-            Ok(_) => self.error(format_args!("{doing} failed: {why}"), "try again"),
-        })
-    }
-
-    /// Whether all went well until now.
+    /// Runs `work`; what the device says against it becomes an error.
     ///
     /// # Errors
-    /// [`Error::Gpu`] with the first thing that went wrong.
-    pub(super) fn check(&self, doing: &str) -> Result<()> {
-        match &*self.fault.lock().expect("no thread panicked") {
-            None => Ok(()),
-            Some(Fault::Memory) => Err(self.error(
-                format_args!("its memory is full ({doing})"),
-                "close other programs, choose fewer samples, or do without the GPU",
-            )),
-            Some(Fault::Lost(why)) => Err(self.error(
-                match why.as_str() {
-                    "" => format!("it was lost ({doing})"),
-                    why => format!("it was lost ({doing}): {why}"),
-                },
-                "try again; if it happens again, look at the system's log and its driver",
-            )),
-            Some(Fault::Other(why)) => Err(self.error(
-                format_args!(
-                    "{doing} failed: {}",
-                    why.split_whitespace().collect::<Vec<_>>().join(" ")
-                ),
-                "this is a fault of screendoor or of the driver: do without the GPU",
-            )),
-        }
+    /// As [`Guard::run`].
+    pub(super) fn run<T>(&self, doing: &str, work: impl FnOnce() -> T) -> Result<T> {
+        self.guard.run(&self.device, doing, work)
     }
 
     /// An empty buffer.
@@ -237,13 +191,13 @@ impl Gpu {
         fill: impl FnOnce(wgpu::WriteOnly<'_, [u8]>) -> Result<()>,
     ) -> Result<wgpu::Buffer> {
         let buffer = self.create(label, bytes, usage, true)?;
+        let doing = format!("uploading {label}");
         {
             let view = buffer.get_mapped_range_mut(..);
-            let mut view = view.map_err(|e| self.failed(&format!("uploading {label}"), &e))?;
+            let mut view = view.map_err(|e| self.guard.failed(&self.device, &doing, e))?;
             fill(view.slice(..))?;
         }
-        buffer.unmap();
-        self.check(&format!("uploading {label}"))?;
+        self.run(&doing, || buffer.unmap())?;
         Ok(buffer)
     }
 
@@ -262,146 +216,54 @@ impl Gpu {
                 "do without the GPU",
             ));
         }
-        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(label),
-            // Bindings must not be empty.
-            size: bytes.max(4).next_multiple_of(4),
-            usage,
-            mapped_at_creation,
-        });
-        self.check(&format!("making room for {label}"))?;
-        Ok(buffer)
-    }
-
-    /// The program `entry` of a shader; compiled once.
-    ///
-    /// # Errors
-    /// [`Error::Gpu`] where it does not compile.
-    pub(super) fn pipeline(
-        &self,
-        source: &str,
-        entry: &str,
-        layout: &wgpu::BindGroupLayout,
-    ) -> Result<wgpu::ComputePipeline> {
-        /// Programs that are kept: enough for every design at several sample counts, which
-        /// the suite of hard cases goes through again and again.
-        const KEPT: usize = 512;
-        let key = (source.to_string(), entry.to_string());
-        let mut pipelines = self.pipelines.lock().expect("no thread panicked");
-        if let Some(pipeline) = pipelines.get(&key) {
-            return Ok(pipeline.clone());
-        }
-        if pipelines.len() >= KEPT {
-            pipelines.clear();
-        }
-        let module = self.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some(entry),
-            source: wgpu::ShaderSource::Wgsl(source.into()),
-        });
-        self.check(&format!("compiling the shader of '{entry}'"))?;
-        let layout = self.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            bind_group_layouts: &[Some(layout)],
-            ..Default::default()
-        });
-        let pipeline = self.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(entry),
-            layout: Some(&layout),
-            module: &module,
-            entry_point: Some(entry),
-            compilation_options: Default::default(),
-            cache: None,
-        });
-        self.check(&format!("compiling '{entry}'"))?;
-        pipelines.insert(key, pipeline.clone());
-        Ok(pipeline)
-    }
-
-    /// The layout of bindings with these numbers.
-    pub(super) fn layout(&self, bindings: &[(u32, Access)]) -> wgpu::BindGroupLayout {
-        let entry = |(binding, access): &(u32, Access)| wgpu::BindGroupLayoutEntry {
-            binding: *binding,
-            visibility: wgpu::ShaderStages::COMPUTE,
-            ty: wgpu::BindingType::Buffer {
-                ty: match access {
-                    Access::Uniform => wgpu::BufferBindingType::Uniform,
-                    Access::Read => wgpu::BufferBindingType::Storage { read_only: true },
-                    Access::Write => wgpu::BufferBindingType::Storage { read_only: false },
-                },
-                has_dynamic_offset: false,
-                min_binding_size: None,
-            },
-            count: None,
-        };
-        let entries: Vec<_> = bindings.iter().map(entry).collect();
-        let descriptor = wgpu::BindGroupLayoutDescriptor { label: None, entries: &entries };
-        self.device.create_bind_group_layout(&descriptor)
-    }
-
-    /// Buffers under their numbers.
-    pub(super) fn bind(
-        &self,
-        layout: &wgpu::BindGroupLayout,
-        buffers: &[(u32, &wgpu::Buffer)],
-    ) -> wgpu::BindGroup {
-        let entries: Vec<_> = buffers
-            .iter()
-            .map(|(binding, buffer)| wgpu::BindGroupEntry {
-                binding: *binding,
-                resource: buffer.as_entire_binding(),
+        self.run(&format!("making room for {label}"), || {
+            self.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(label),
+                // Bindings must not be empty.
+                size: bytes.max(4).next_multiple_of(4),
+                usage,
+                mapped_at_creation,
             })
-            .collect();
-        let descriptor = wgpu::BindGroupDescriptor { label: None, layout, entries: &entries };
-        self.device.create_bind_group(&descriptor)
+        })
     }
 
-    /// Starts what was encoded.
+    /// Has the device do what `encode` asks of it.
     ///
     /// # Errors
-    /// As [`Gpu::check`].
-    pub(super) fn submit(&self, encoder: wgpu::CommandEncoder, doing: &str) -> Result<()> {
-        self.queue.submit([encoder.finish()]);
-        self.check(doing)
+    /// As [`Gpu::run`] and `encode`.
+    pub(super) fn submit(
+        &self,
+        doing: &str,
+        encode: impl FnOnce(&mut wgpu::CommandEncoder) -> Result<()>,
+    ) -> Result<()> {
+        self.run(doing, || {
+            let mut encoder = self.device.create_command_encoder(&Default::default());
+            encode(&mut encoder)?;
+            self.queue.submit([encoder.finish()]);
+            Ok(())
+        })?
     }
 
     /// Waits until everything is done.
     ///
     /// # Errors
-    /// As [`Gpu::check`].
+    /// As [`Guard::wait`].
     pub(super) fn wait(&self, doing: &str) -> Result<()> {
-        let polled = self.device.poll(wgpu::PollType::wait_indefinitely());
-        self.check(doing)?;
-        polled.map_err(|e| self.error(format_args!("{doing} did not end: {e}"), "try again"))?;
-        Ok(())
+        self.guard.wait(&self.device, doing)
     }
 
     /// Brings a buffer back and hands it to `look`.
     ///
     /// # Errors
-    /// As [`Gpu::check`].
+    /// As [`Guard::read`].
     pub(super) fn read<T>(
         &self,
         buffer: &wgpu::Buffer,
         doing: &str,
         look: impl FnOnce(&[u32]) -> T,
     ) -> Result<T> {
-        let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
-        let copy = self.buffer("what comes back", buffer.size(), usage)?;
-        let mut encoder = self.device.create_command_encoder(&Default::default());
-        encoder.copy_buffer_to_buffer(buffer, 0, &copy, 0, buffer.size());
-        self.submit(encoder, doing)?;
-        let (sender, receiver) = std::sync::mpsc::channel();
-        copy.map_async(wgpu::MapMode::Read, .., move |result| {
-            // Nobody waits any more where waiting has failed.
-            let _ = sender.send(result);
-        });
-        self.wait(doing)?;
-        match receiver.recv() {
-            Ok(Ok(())) => {}
-            Ok(Err(e)) => return Err(self.failed(doing, &e)),
-            Err(e) => return Err(self.failed(doing, &e)),
-        }
-        let view = copy.get_mapped_range(..).map_err(|e| self.failed(doing, &e))?;
-        Ok(look(bytemuck::cast_slice(&view)))
+        let whole = (buffer, 0..buffer.size());
+        self.guard.read((&self.device, &self.queue), whole, doing, look)
     }
 
     /// How many groups to start in each dimension so that there are at least `groups`.
@@ -416,14 +278,6 @@ impl Gpu {
 pub(super) fn most_bytes(device: &wgpu::Device) -> u64 {
     let limits = device.limits();
     limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
-}
-
-/// What a program does with a binding.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Access {
-    Uniform,
-    Read,
-    Write,
 }
 
 /// The adapters, the most wanted first.

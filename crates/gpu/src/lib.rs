@@ -19,10 +19,14 @@ mod chunk;
 mod device;
 mod differences;
 #[cfg(feature = "wgpu")]
+mod guard;
+#[cfg(feature = "wgpu")]
 mod loaders;
 mod options;
 #[cfg(feature = "wgpu")]
 mod params;
+#[cfg(feature = "wgpu")]
+mod program;
 #[cfg(feature = "wgpu")]
 mod replay;
 #[cfg(feature = "wgpu")]

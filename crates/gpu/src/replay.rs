@@ -7,9 +7,10 @@ use rayon::prelude::*;
 
 use crate::bin::{Binner, Scratch, Sorted, uniform};
 use crate::chunk::{Chunks, Uploaded};
-use crate::device::{Access, Gpu, most_bytes};
+use crate::device::{Gpu, most_bytes};
 use crate::options::{GpuOptions, GpuSeconds, Threads};
 use crate::params::Params;
+use crate::program::Program;
 use crate::shader;
 use crate::time::Timer;
 use screendoor_designs::Configured;
@@ -52,23 +53,22 @@ struct Ready {
 }
 
 /// A program of a design.
-struct Program {
+struct Step {
     /// As what its time is counted.
     name: &'static str,
-    pipeline: wgpu::ComputePipeline,
+    program: Program,
     /// Pixels that a group is given.
     pixels: usize,
 }
 
 /// The design's programs.
 struct Programs {
-    layout: wgpu::BindGroupLayout,
-    clear: Program,
-    draw: Program,
+    clear: Step,
+    draw: Step,
     /// How many fragments of each pixel are drawn at a time.
     fragments: u32,
-    end_pass: Option<Program>,
-    resolve: Option<Program>,
+    end_pass: Option<Step>,
+    resolve: Option<Step>,
     tables: wgpu::Buffer,
     /// What is bound where a program looks at nothing: to read from, and to write to.
     nothing: [wgpu::Buffer; 2],
@@ -123,34 +123,30 @@ impl Programs {
     ) -> Result<Self> {
         let samples = frame.samples();
         let source = source(&[port.program], port, samples, chunks.types());
-        use Access::{Read, Uniform, Write};
-        let bindings = [Uniform, Read, Read, Write, Read, Read, Read, Write];
-        let layout = gpu.layout(&(0..).zip(bindings).collect::<Vec<_>>());
-        let program = |name| -> Result<Program> {
-            Ok(Program { name, pipeline: gpu.pipeline(&source, name, &layout)?, pixels: GROUP })
+        let step = |name| -> Result<Step> {
+            Ok(Step { name, program: gpu.program(&source, name)?, pixels: GROUP })
         };
         let by_sample = threads == Threads::Sample && port.by_sample;
         let (draw, iterations) = if by_sample {
             let file = lanes_file(gpu, samples);
             let source =
                 self::source(&[port.program, shader::named(file)], port, samples, chunks.types());
-            let pipeline = gpu.pipeline(&source, "draw_lanes", &layout)?;
+            let program = gpu.program(&source, "draw_lanes")?;
             // Two loops over the samples, and what a reference value may take.
             let iterations = 2 * samples + u32::BITS;
-            (Program { name: "draw", pipeline, pixels: GROUP / samples as usize }, iterations)
+            (Step { name: "draw", program, pixels: GROUP / samples as usize }, iterations)
         } else {
-            (program("draw")?, port.iterations)
+            (step("draw")?, port.iterations)
         };
         let storage = wgpu::BufferUsages::STORAGE;
         Ok(Programs {
-            clear: program("clear")?,
+            clear: step("clear")?,
             draw,
             fragments: (ITERATIONS / (iterations + 1)).max(1),
-            end_pass: port.ends_passes.then(|| program("end_pass")).transpose()?,
-            resolve: port.resolves.then(|| program("resolve")).transpose()?,
+            end_pass: port.ends_passes.then(|| step("end_pass")).transpose()?,
+            resolve: port.resolves.then(|| step("resolve")).transpose()?,
             tables: gpu.filled("tables", bytemuck::cast_slice(&tables(port, frame)), storage)?,
             nothing: [gpu.buffer("nothing", 8, storage)?, gpu.buffer("nothing", 8, storage)?],
-            layout,
         })
     }
 }
@@ -260,8 +256,8 @@ impl<'a> GpuRun<'a> {
                 done += chunks.rows(i) as u64;
                 (options.progress)(done, total);
             }
-            if let Some(program) = &self.programs.end_pass {
-                self.for_all_pages(program, None)?;
+            if let Some(step) = &self.programs.end_pass {
+                self.for_all_pages(step, None)?;
             }
         }
         Ok(())
@@ -327,16 +323,16 @@ impl<'a> GpuRun<'a> {
         Ok(())
     }
 
-    fn for_all_pages(&self, program: &Program, chunk: Option<(&Ready, Params)>) -> Result<()> {
+    fn for_all_pages(&self, step: &Step, chunk: Option<(&Ready, Params)>) -> Result<()> {
         let mut pages = 0..self.pages.len();
-        pages.try_for_each(|page| self.run_on(page, program, chunk, None))
+        pages.try_for_each(|page| self.run_on(page, step, chunk, None))
     }
 
     /// Runs a program for the pixels of a page, as far as the chunk knows them.
     fn run_on(
         &self,
         page: usize,
-        program: &Program,
+        step: &Step,
         chunk: Option<(&Ready, Params)>,
         picture: Option<&wgpu::Buffer>,
     ) -> Result<()> {
@@ -358,21 +354,21 @@ impl<'a> GpuRun<'a> {
         // What is not there is not read.
         let [nothing, nowhere] = &self.programs.nothing;
         let buffers = [
-            (0, &uniform(self.gpu, &params)?),
-            (1, chunk.map_or(nothing, |chunk| &chunk.uploaded.columns)),
-            (2, &self.programs.tables),
-            (3, state),
-            (4, chunk.map_or(nothing, |chunk| &chunk.sorted.rows)),
-            (5, chunk.map_or(nothing, |chunk| &chunk.sorted.ends)),
-            (6, &self.tile_of),
-            (7, picture.unwrap_or(nowhere)),
+            ("params", &uniform(self.gpu, &params)?),
+            ("columns", chunk.map_or(nothing, |chunk| &chunk.uploaded.columns)),
+            ("tables", &self.programs.tables),
+            ("state", state),
+            ("rows", chunk.map_or(nothing, |chunk| &chunk.sorted.rows)),
+            ("ends", chunk.map_or(nothing, |chunk| &chunk.sorted.ends)),
+            ("tile_of", &self.tile_of),
+            ("picture", picture.unwrap_or(nowhere)),
         ];
-        let bound = self.gpu.bind(&self.programs.layout, &buffers);
-        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        let groups = taken.div_ceil(program.pixels) as u64;
-        let Program { name, pipeline, .. } = program;
-        self.timer.run(self.gpu, &mut encoder, name, (pipeline, &bound), groups);
-        self.gpu.submit(encoder, program.name)
+        let bound = self.gpu.bind(&step.program, &buffers)?;
+        let groups = taken.div_ceil(step.pixels) as u64;
+        self.gpu.submit(step.name, |encoder| {
+            self.timer.run(self.gpu, encoder, step.name, (&step.program, &bound), groups);
+            Ok(())
+        })
     }
 
     /// How many tiles hold a fragment.
@@ -423,7 +419,7 @@ impl<'a> GpuRun<'a> {
         let begun = Instant::now();
         let grid = self.frame.grid;
         let tiles = match &self.programs.resolve {
-            Some(program) => self.resolved(program)?,
+            Some(step) => self.resolved(step)?,
             None => self.states(|tile, state| self.port.plain.resolve(grid, tile, &state))?,
         };
         let mut finished: TileMap<TilePixels> = TileMap::new(grid);
@@ -436,13 +432,13 @@ impl<'a> GpuRun<'a> {
         Ok(Picture::from_tiles(self.frame.background.map(f64::from), finished))
     }
 
-    fn resolved(&self, program: &Program) -> Result<Vec<(TileId, TilePixels)>> {
+    fn resolved(&self, step: &Step) -> Result<Vec<(TileId, TilePixels)>> {
         let mut all = Vec::with_capacity(self.tiles.len());
         for (i, page) in self.pages.iter().enumerate() {
             let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
             let bytes = (12 * page.tiles * TILE_PIXELS) as u64;
             let picture = self.gpu.buffer("the picture", bytes, usage)?;
-            self.run_on(i, program, None, Some(&picture))?;
+            self.run_on(i, step, None, Some(&picture))?;
             let tiles = &self.tiles[page.first..page.first + page.tiles];
             self.gpu.read(&picture, "bringing the picture back", |words| {
                 for (tile, words) in tiles.iter().zip(words.chunks_exact(3 * TILE_PIXELS)) {

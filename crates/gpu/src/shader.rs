@@ -16,6 +16,7 @@ pub(super) const OWN: &[Shader] = &[
     shader!("shaders/", "capture"),
     shader!("shaders/", "column"),
     shader!("shaders/", "fragment"),
+    shader!("shaders/", "frame"),
     shader!("shaders/", "lanes"),
     shader!("shaders/", "lanes_subgroup"),
     shader!("shaders/", "lanes_workgroup"),

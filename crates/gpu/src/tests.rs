@@ -11,7 +11,7 @@ use super::shader::defect::{self, Defect};
 use super::shader::{self, OWN};
 use super::{GpuOptions, GpuRun, Threads};
 use screendoor_designs::{Configured, DESIGNS, configure};
-use screendoor_rop::{Constant, Contents, SHADERS, Which};
+use screendoor_rop::{Constant, Contents, Implementation, SHADERS};
 use screendoor_trace::param::Kind;
 use screendoor_trace::random::Stream;
 use screendoor_trace::trace::{
@@ -150,7 +150,10 @@ fn held(
 
 /// The same by the plain text, but for what pixels hold.
 fn shown(design: &Configured, trace: &Trace) -> String {
-    let options = screendoor_rop::ReplayOptions { engine: Which::Reference, ..Default::default() };
+    let options = screendoor_rop::ReplayOptions {
+        implementation: Implementation::Reference,
+        ..Default::default()
+    };
     design.replay(trace, 8, 5, &options).unwrap().picture.hash()
 }
 
@@ -246,8 +249,7 @@ fn a_planted_defect_is_found_whatever_part_it_is_in() {
 #[test]
 fn what_fails_on_a_device_is_told() {
     let Ok(gpu) = Gpu::open(None) else { return };
-    let layout = gpu.layout(&[]);
-    let error = gpu.pipeline("fn broken(", "broken", &layout).unwrap_err().to_string();
+    let error = gpu.program("fn broken(", "broken").unwrap_err().to_string();
     assert!(error.contains("compiling the shader of 'broken' failed"), "{error}");
 
     let gpu = Gpu::open(None).unwrap();
@@ -262,4 +264,20 @@ fn what_fails_on_a_device_is_told() {
     let lost = super::replay::replay(&gpu, &design, &trace, 4, 0, &GpuOptions::default());
     let error = lost.map(|_| ()).unwrap_err().to_string();
     assert!(error.contains(&gpu.adapter().name) && error.contains("lost"), "{error}");
+}
+
+#[test]
+fn anybodys_device_draws_the_same_and_keeps_its_handler() {
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
+    let all = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::all()));
+    let Some(adapter) = all.first() else { return };
+    // With the least that a device has, as an engine opens it.
+    let opened = adapter.request_device(&wgpu::DeviceDescriptor::default());
+    let Ok((device, queue)) = pollster::block_on(opened) else { return };
+    device.on_uncaptured_error(std::sync::Arc::new(|e| panic!("the owner is told: {e}")));
+    let gpu = Gpu::from_device(adapter, device, queue);
+    let (trace, design) = (trace(8), configure("lk", &[]).unwrap());
+    assert_eq!(held(&gpu, &design, &trace, Threads::Pixel).1, shown(&design, &trace));
+    let error = gpu.program("fn broken(", "broken").unwrap_err().to_string();
+    assert!(error.contains("compiling the shader of 'broken' failed"), "{error}");
 }

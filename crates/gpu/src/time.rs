@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Mutex;
 
 use crate::device::Gpu;
+use crate::program::Program;
 use screendoor_trace::error::Result;
 
 /// Passes that are timed, at most; wgpu allows a set twice as many queries.
@@ -23,8 +24,9 @@ impl Timer {
             ty: wgpu::QueryType::Timestamp,
             count: 2 * MOST,
         };
-        let queries = gpu.has_timestamps().then(|| gpu.device.create_query_set(&descriptor));
-        gpu.check("making room for time stamps")?;
+        let make = || gpu.device.create_query_set(&descriptor);
+        let queries = gpu.has_timestamps().then(|| gpu.run("making room for time stamps", make));
+        let queries = queries.transpose()?;
         Ok(Timer { queries, names: Mutex::default() })
     }
 
@@ -35,11 +37,11 @@ impl Timer {
         gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
         name: &'static str,
-        (pipeline, bound): (&wgpu::ComputePipeline, &wgpu::BindGroup),
+        (program, bound): (&Program, &wgpu::BindGroup),
         groups: u64,
     ) {
         let mut pass = self.pass(encoder, name);
-        pass.set_pipeline(pipeline);
+        pass.set_pipeline(&program.pipeline);
         pass.set_bind_group(0, bound, &[]);
         let [x, y] = gpu.spread(groups);
         pass.dispatch_workgroups(x, y, 1);
@@ -76,9 +78,10 @@ impl Timer {
         };
         let usage = wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC;
         let stamps = gpu.buffer("time stamps", 16 * u64::from(count), usage)?;
-        let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        encoder.resolve_query_set(queries, 0..2 * count, &stamps, 0);
-        gpu.submit(encoder, "reading the clock")?;
+        gpu.submit("reading the clock", |encoder| {
+            encoder.resolve_query_set(queries, 0..2 * count, &stamps, 0);
+            Ok(())
+        })?;
         let unit = f64::from(gpu.queue.get_timestamp_period()) * 1e-9;
         gpu.read(&stamps, "reading the clock", |words| {
             let mut sums = BTreeMap::new();

@@ -25,7 +25,6 @@ pub use contract::blueprint::Blueprint;
 pub use contract::colour::ColourStore;
 pub use contract::contents::{Contents, SampleContents};
 pub use contract::design::Design;
-pub use contract::engine::{Engine, TileState, Told};
 pub use contract::event::{
     Event, EventCounts, Listen, NoProbe, Probe, Record, ReferenceRecord, network_comparators,
 };
@@ -40,13 +39,15 @@ pub use contract::promise::Promise;
 pub use contract::promises::{OpaquePromise, OrderPromise, Promises};
 pub use contract::samples::{SampleList, Samples, in_sample_order, sort_by_stored_depth};
 pub use contract::shader::Shader;
+pub use contract::tiled::{Listener, TileState, TiledDesign};
 pub use contract::words::{
     Constant, Declaration, Field, OnDevice, PixelWords, Ranks, TILE, TileWords,
 };
 pub use layered::bounded::{Bounded, Eviction};
-pub use layered::normalise::{Normalise, Sums};
+pub use layered::normalise::{Normalise, VisibilitySums};
 pub use replay::{
-    ExplainLimits, Explanation, ReplayOptions, Replayed, Step, Which, draw_pixel, explain, replay,
+    ExplainLimits, Explanation, Implementation, ReplayOptions, Replayed, Step, draw_pixel, explain,
+    replay,
 };
 pub use shaders::SHADERS;
 pub use stochastic::dither::{BAYER, BLUE_NOISE, Dither, stratified};

@@ -1,6 +1,8 @@
 //! What is done to screendoor's tree and not by its users: `cargo run -p xtask -- --help`.
 
+mod process;
 mod same;
+mod write;
 
 use std::process::ExitCode;
 
@@ -16,11 +18,13 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Task {
     Same(same::Arguments),
+    Write(write::Arguments),
 }
 
 fn main() -> ExitCode {
     let done = match Arguments::parse().task {
         Task::Same(arguments) => same::run(&arguments),
+        Task::Write(arguments) => write::run(&arguments),
     };
     match done {
         Ok(true) => ExitCode::SUCCESS,

@@ -2,7 +2,6 @@
 //! what a study of all designs on them finds, its pictures with it.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::error::Error;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -10,7 +9,7 @@ use std::process::Command;
 use clap::Args;
 use serde_json::Value;
 
-type Result<T> = std::result::Result<T, Box<dyn Error>>;
+use crate::process::{Result, call};
 
 /// Compare what two versions of the program give, byte for byte
 #[derive(Args)]
@@ -55,14 +54,6 @@ fn program(version: &str) -> Result<PathBuf> {
     let build = ["build", "--locked", "--release", "--bin", "screendoor"];
     call(Command::new("cargo").args(build).current_dir(&tree))?;
     Ok(tree.join("target/release/screendoor"))
-}
-
-fn call(command: &mut Command) -> Result<Vec<u8>> {
-    let output = command.stderr(std::process::Stdio::inherit()).output()?;
-    match output.status.success() {
-        true => Ok(output.stdout),
-        false => Err(format!("{command:?} failed").into()),
-    }
 }
 
 /// What a version gives: files by their names, and records by theirs.

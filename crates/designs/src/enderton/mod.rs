@@ -10,9 +10,10 @@ use screendoor_rop::fast::{Count, FastEngine, Width};
 use screendoor_rop::shader;
 use screendoor_rop::stochastic::{self, COMBINATIONS, METHOD, OPAQUE, ROUNDS, STRATA};
 use screendoor_rop::{
-    Blueprint, Declaration, Dither, Engine, Family, Frame, Info, OnDevice, OpaquePromise,
-    OrderPromise, PixelOrder, PixelWords, Port, Probe, Promise, Promises, Reference, ReferenceKey,
-    Round, Sampler, Site, Stochastic, Threshold, colour, depth_bits, random_subset, stratified,
+    Blueprint, Declaration, Dither, Family, Frame, Info, OnDevice, OpaquePromise, OrderPromise,
+    PixelOrder, PixelWords, Port, Probe, Promise, Promises, Reference, ReferenceKey, Round,
+    Sampler, Site, Stochastic, Threshold, TiledDesign, colour, depth_bits, random_subset,
+    stratified,
 };
 use screendoor_trace::error::Result;
 use screendoor_trace::param::{Typed, Values};
@@ -97,7 +98,7 @@ impl Blueprint for Enderton {
         values: &Values,
         frame: &Frame,
         level: Level,
-    ) -> Result<Option<Box<dyn Engine>>>
+    ) -> Result<Option<Box<dyn TiledDesign>>>
     where
         Count<N>: Width,
     {

@@ -7,7 +7,9 @@ use fearless_simd::{Level, Simd, dispatch};
 use crate::exact::lanes::{Composite, Depths, LANES, Offsets, Row, covers, depth_at, row};
 use crate::exact::order::{CHUNK, insert_in_order, keep, rank, shorten};
 use crate::exact::tell;
-use screendoor_rop::{Contents, Engine, Frame, Layout as StateLayout, Probe, TileState, Told};
+use screendoor_rop::{
+    Contents, Frame, Layout as StateLayout, Listener, Probe, TileState, TiledDesign,
+};
 use screendoor_trace::tile::{TILE_PIXELS, TileGrid, TileId};
 use screendoor_trace::trace::{Block, DepthPlane, SampleMask};
 
@@ -16,7 +18,7 @@ use screendoor_trace::trace::{Block, DepthPlane, SampleMask};
 pub struct Fast {
     frame: Frame,
     /// Is asked for what the engine says of the design.
-    reference: Box<dyn Engine>,
+    reference: Box<dyn TiledDesign>,
     level: Level,
 }
 
@@ -35,12 +37,12 @@ struct Layer {
 
 impl Fast {
     /// The engine beside `reference`, on the instructions of `level`.
-    pub fn new(frame: &Frame, reference: Box<dyn Engine>, level: Level) -> Self {
+    pub fn new(frame: &Frame, reference: Box<dyn TiledDesign>, level: Level) -> Self {
         Fast { frame: frame.clone(), reference, level }
     }
 }
 
-impl Engine for Fast {
+impl TiledDesign for Fast {
     fn passes(&self) -> u32 {
         self.reference.passes()
     }
@@ -59,11 +61,11 @@ impl Engine for Fast {
         Box::new(Vec::<Layer>::with_capacity(TILE_PIXELS))
     }
 
-    fn draw(&self, _pass: u32, state: &mut TileState, fragments: &Block, told: Told<'_>) {
-        match told {
-            Told::Nobody => {}
-            Told::Counts(counts) => tell_all(&self.frame, fragments, counts),
-            Told::Record(record) => tell_all(&self.frame, fragments, record),
+    fn draw(&self, _pass: u32, state: &mut TileState, fragments: &Block, listener: Listener<'_>) {
+        match listener {
+            Listener::Nobody => {}
+            Listener::Counts(counts) => tell_all(&self.frame, fragments, counts),
+            Listener::Record(record) => tell_all(&self.frame, fragments, record),
         }
         let layers = state.downcast_mut::<Vec<Layer>>().expect("the state is the engine's own");
         layers.extend(fragments.iter().map(|f| Layer {
@@ -75,7 +77,7 @@ impl Engine for Fast {
         }));
     }
 
-    fn end_pass(&self, _: u32, _: TileGrid, _: TileId, _: &mut TileState, _: Told<'_>) {}
+    fn end_pass(&self, _: u32, _: TileGrid, _: TileId, _: &mut TileState, _: Listener<'_>) {}
 
     fn resolve(&self, _grid: TileGrid, _tile: TileId, state: &TileState) -> Box<Pixels> {
         let layers = state.downcast_ref::<Vec<Layer>>().expect("the state is the engine's own");

@@ -9,8 +9,8 @@ use fearless_simd::Level;
 use crate::exact::fast::Fast;
 use screendoor_rop::fast::{Count, Width};
 use screendoor_rop::{
-    Blueprint, Contents, Design, Engine, Family, Frame, Info, Layout, OpaquePromise, OrderPromise,
-    Probe, Promise, Promises, Site,
+    Blueprint, Contents, Design, Family, Frame, Info, Layout, OpaquePromise, OrderPromise, Probe,
+    Promise, Promises, Site, TiledDesign,
 };
 use screendoor_trace::error::Result;
 use screendoor_trace::param::Values;
@@ -39,7 +39,7 @@ impl Blueprint for Exact {
         values: &Values,
         frame: &Frame,
         level: Level,
-    ) -> Result<Option<Box<dyn Engine>>>
+    ) -> Result<Option<Box<dyn TiledDesign>>>
     where
         Count<N>: Width,
     {

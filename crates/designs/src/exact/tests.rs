@@ -3,7 +3,7 @@
 use crate::exact::fast::Fast;
 use crate::{REFERENCE, configure};
 use screendoor_rop::fast::levels;
-use screendoor_rop::{Engine, EventCounts, Frame, TileState, Told, Which};
+use screendoor_rop::{EventCounts, Frame, Implementation, Listener, TileState, TiledDesign};
 use screendoor_trace::random::Stream;
 use screendoor_trace::tile::{TILE_PIXELS, TileGrid, TileId};
 use screendoor_trace::trace::{Block, DepthPlane, Fragment, SampleMask, Unorm32};
@@ -116,19 +116,23 @@ fn fragments(random: &mut Stream, samples: u32, depths: Depths, deepest: u32) ->
     all
 }
 
-fn reference(frame: &Frame) -> Box<dyn Engine> {
-    configure(REFERENCE, &[]).unwrap().build(frame, Which::Reference).unwrap()
+fn reference(frame: &Frame) -> Box<dyn TiledDesign> {
+    configure(REFERENCE, &[]).unwrap().build(frame, Implementation::Reference).unwrap()
 }
 
 /// The tile's state after `fragments`, in uneven parts, and what was counted.
-fn drawn(engine: &dyn Engine, frame: &Frame, fragments: &[Fragment]) -> (TileState, EventCounts) {
+fn drawn(
+    engine: &dyn TiledDesign,
+    frame: &Frame,
+    fragments: &[Fragment],
+) -> (TileState, EventCounts) {
     let mut state = engine.clear(frame.grid, TILE);
     let mut counts = EventCounts::default();
     let (first, rest) = fragments.split_at(fragments.len() / 3);
     for part in std::iter::once(first).chain(rest.chunks(64)).flat_map(Block::all_of) {
-        engine.draw(0, &mut state, &part, Told::Counts(&mut counts));
+        engine.draw(0, &mut state, &part, Listener::Counts(&mut counts));
     }
-    engine.end_pass(0, frame.grid, TILE, &mut state, Told::Nobody);
+    engine.end_pass(0, frame.grid, TILE, &mut state, Listener::Nobody);
     (state, counts)
 }
 
@@ -144,7 +148,7 @@ fn assert_same(frame: &Frame, fragments: &[Fragment], what: &str) {
         for within in 0..TILE_PIXELS {
             let [a, b] = [&expected, &picture].map(|p| p[within].map(f64::to_bits));
             assert_eq!(a, b, "{what}, {} samples, {level:?}, pixel {within}", frame.samples());
-            let [a, b] = [(&*reference_engine, &state), (&fast as &dyn Engine, &fast_state)]
+            let [a, b] = [(&*reference_engine, &state), (&fast as &dyn TiledDesign, &fast_state)]
                 .map(|(engine, state)| engine.contents(state, within));
             assert_eq!(a, b, "{what}");
         }

@@ -1,10 +1,9 @@
 //! The buffer that a fragment shader appends to, on anybody's device.
 
-use std::fmt::Display;
-
 use bytemuck::{Pod, Zeroable};
 
 use crate::device::most_bytes;
+use crate::guard::Guard;
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::trace::{DepthPlane, Fragment, SampleMask, Unorm32};
 
@@ -132,7 +131,7 @@ impl FragmentBuffer {
                 format_args!("the device's buffers hold 1 to {most}"),
             ));
         }
-        guarded(device, "making room for fragments", || {
+        guard().run(device, "making room for fragments", || {
             let buffer = device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("captured fragments"),
                 size: HEAD + u64::from(capacity) * EACH,
@@ -196,79 +195,26 @@ impl FragmentBuffer {
     /// # Errors
     /// [`Error::Gpu`] where the device was lost or has no memory for that.
     pub fn read(&self, device: &wgpu::Device, queue: &wgpu::Queue) -> Result<Captured> {
-        let count = self.bring(device, queue, 0..HEAD, |words| words[0])?;
+        let guard = guard();
+        let doing = "reading fragments";
+        let count =
+            guard.read((device, queue), (&self.buffer, 0..HEAD), doing, |words| words[0])?;
         if count > self.capacity {
             return Ok(Captured::TooMany(count.into()));
         }
-        let fragments = if count == 0 {
-            Vec::new()
-        } else {
-            let end = HEAD + u64::from(count) * EACH;
-            self.bring(device, queue, HEAD..end, |words| bytemuck::cast_slice(words).to_vec())?
-        };
+        if count == 0 {
+            return Ok(Captured::All(Vec::new()));
+        }
+        let part = (&self.buffer, HEAD..HEAD + u64::from(count) * EACH);
+        let look = |words: &[u32]| bytemuck::cast_slice(words).to_vec();
+        let fragments = guard.read((device, queue), part, doing, look)?;
         Ok(Captured::All(in_order(fragments)))
     }
-
-    /// Copies a part of the buffer back and hands it to `look`.
-    fn bring<T>(
-        &self,
-        device: &wgpu::Device,
-        queue: &wgpu::Queue,
-        part: std::ops::Range<u64>,
-        look: impl FnOnce(&[u32]) -> T,
-    ) -> Result<T> {
-        let doing = "reading fragments";
-        let size = part.end - part.start;
-        let (sender, receiver) = std::sync::mpsc::channel();
-        let copy = guarded(device, doing, || {
-            let copy = device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("fragments that come back"),
-                size,
-                usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            });
-            let mut encoder = device.create_command_encoder(&Default::default());
-            encoder.copy_buffer_to_buffer(&self.buffer, part.start, &copy, 0, size);
-            queue.submit([encoder.finish()]);
-            copy.map_async(wgpu::MapMode::Read, .., move |result| {
-                // Nobody waits any more where waiting has failed.
-                let _ = sender.send(result);
-            });
-            copy
-        })?;
-        device.poll(wgpu::PollType::wait_indefinitely()).map_err(|e| failed(doing, e))?;
-        receiver.recv().map_err(|e| failed(doing, e))?.map_err(|e| failed(doing, e))?;
-        let view = copy.get_mapped_range(..).map_err(|e| failed(doing, e))?;
-        Ok(look(bytemuck::cast_slice(&view)))
-    }
 }
 
-/// Runs `make`; what the device says against it becomes an error.
-fn guarded<T>(device: &wgpu::Device, doing: &str, make: impl FnOnce() -> T) -> Result<T> {
-    let memory = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
-    let valid = device.push_error_scope(wgpu::ErrorFilter::Validation);
-    let made = make();
-    // The inner one first.
-    let valid = pollster::block_on(valid.pop());
-    let memory = pollster::block_on(memory.pop());
-    match (memory, valid) {
-        (Some(_), _) => Err(Error::gpu(
-            format_args!("the GPU ({doing})"),
-            "its memory is full",
-            "close other programs, or take a smaller buffer and draw less at a time",
-        )),
-        (None, Some(error)) => Err(failed(doing, error)),
-        (None, None) => Ok(made),
-    }
-}
-
-fn failed(doing: &str, why: impl Display) -> Error {
-    let why = why.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
-    Error::gpu(
-        format_args!("the GPU ({doing})"),
-        why,
-        "try again; if it happens again, look at the system's log and the GPU's driver",
-    )
+/// Of anybody's device, whose name is not known here.
+fn guard() -> Guard {
+    Guard::new("the GPU")
 }
 
 #[cfg(test)]

@@ -56,7 +56,7 @@ impl<'a> Rasteriser<'a> {
         let capacity = capacity.max(7 * size[0]).min(FragmentBuffer::most(&gpu.device));
         let fragments = FragmentBuffer::new(&gpu.device, capacity)?;
         let format = wgpu::TextureFormat::R8Unorm;
-        let target = gpu.device.create_texture(&wgpu::TextureDescriptor {
+        let descriptor = wgpu::TextureDescriptor {
             label: Some("a frame to draw nothing into"),
             size: wgpu::Extent3d { width: size[0], height: size[1], depth_or_array_layers: 1 },
             mip_level_count: 1,
@@ -65,11 +65,12 @@ impl<'a> Rasteriser<'a> {
             format,
             usage: wgpu::TextureUsages::RENDER_ATTACHMENT,
             view_formats: &[],
-        });
-        gpu.check("making a frame")?;
-        let target = target.create_view(&Default::default());
-        let pipeline = pipeline(gpu, fragments.layout(), format);
-        gpu.check("compiling the capture's shaders")?;
+        };
+        let target = gpu.run("making a frame", || {
+            gpu.device.create_texture(&descriptor).create_view(&Default::default())
+        })?;
+        let pipeline = gpu
+            .run("compiling the capture's shaders", || pipeline(gpu, fragments.layout(), format))?;
         Ok(Rasteriser { gpu, pipeline, target, fragments, size })
     }
 
@@ -92,9 +93,7 @@ impl<'a> Rasteriser<'a> {
         let mut left = vec![Part { triangles, rows: 0..self.size[1] }];
         while let Some(part) = left.pop() {
             self.pass(&vertices, &part)?;
-            let captured = self.fragments.read(&self.gpu.device, &self.gpu.queue);
-            self.gpu.check("drawing fragments")?;
-            match captured? {
+            match self.fragments.read(&self.gpu.device, &self.gpu.queue)? {
                 Captured::All(fragments) => each(fragments)?,
                 Captured::TooMany(needed) => {
                     let room = u64::from(self.fragments.capacity());
@@ -117,9 +116,8 @@ impl<'a> Rasteriser<'a> {
         let Range { start: first, end } = part.rows;
         let rows = bytemuck::bytes_of(&[first, end]).to_vec();
         let rows = self.gpu.filled("rows", &rows, wgpu::BufferUsages::VERTEX)?;
-        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
-        self.fragments.clear(&mut encoder);
-        {
+        self.gpu.submit("drawing fragments", |encoder| {
+            self.fragments.clear(encoder);
             let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                 label: Some("fragments"),
                 color_attachments: &[Some(wgpu::RenderPassColorAttachment {
@@ -142,8 +140,8 @@ impl<'a> Rasteriser<'a> {
             let [above, below] = [first.saturating_sub(1), (end + 1).min(self.size[1])];
             pass.set_scissor_rect(0, above, self.size[0], below - above);
             pass.draw(part.triangles.start * 3..part.triangles.end * 3, 0..1);
-        }
-        self.gpu.submit(encoder, "drawing fragments")
+            Ok(())
+        })
     }
 }
 

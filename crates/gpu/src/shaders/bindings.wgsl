@@ -34,5 +34,3 @@ struct Params {
 @group(0) @binding(0) var<uniform> params: Params;
 // The chunk's columns as they are in the file, one after the other, each from a whole word on.
 @group(0) @binding(1) var<storage, read> columns: array<u32>;
-// The samples' places, and what else the design asked for.
-@group(0) @binding(2) var<storage, read> tables: array<u32>;

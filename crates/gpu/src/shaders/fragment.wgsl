@@ -53,17 +53,6 @@ fn narrowed(z: u32, bits: u32) -> u32 {
     return z | ((1u << ((32u - bits) & 31u)) - 1u);
 }
 
-// Where sample s lies, in 1/16 pixel from the pixel's centre.
-fn sample_position(s: u32) -> vec2<i32> {
-    let word = bitcast<i32>(tables[s]);
-    return vec2<i32>((word << 16u) >> 16u, word >> 16u);
-}
-
-// Frame::depths, of one sample.
-fn sample_depth(f: Fragment, s: u32, bits: u32) -> u32 {
-    return narrowed(depth_at(f, sample_position(s)), bits);
-}
-
 // TileGrid::tile, of a row's pixel.
 fn tile_at(row: u32) -> u32 {
     let x = column_x(row);

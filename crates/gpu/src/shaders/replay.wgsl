@@ -1,5 +1,5 @@
 // The replay's programs: clearing, drawing and ending a pass, a pixel for each thread.
-// uses: bindings fragment state
+// uses: bindings fragment frame state
 
 // Rows sorted by pixel, in API order within a pixel; where each pixel's end, of all pages.
 @group(0) @binding(4) var<storage, read> rows: array<u32>;

@@ -3,11 +3,11 @@
 use fearless_simd::Level;
 
 use crate::contract::design::Design;
-use crate::contract::engine::Engine;
 use crate::contract::frame::Frame;
 use crate::contract::info::Info;
 use crate::contract::port::Port;
 use crate::contract::promises::Promises;
+use crate::contract::tiled::TiledDesign;
 use crate::lanes::{Count, Width};
 use screendoor_trace::error::Result;
 use screendoor_trace::param::Values;
@@ -45,7 +45,7 @@ pub trait Blueprint: 'static {
         _values: &Values,
         _frame: &Frame,
         _level: Level,
-    ) -> Result<Option<Box<dyn Engine>>>
+    ) -> Result<Option<Box<dyn TiledDesign>>>
     where
         Count<N>: Width,
     {

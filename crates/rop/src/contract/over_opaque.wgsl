@@ -1,6 +1,6 @@
 // Twin of crates/rop/src/contract/over_opaque.rs: opaque geometry first, transparent geometry over it.
 // `inner_clear`, `inner_load`, `inner_store`, `inner_draw` and `inner_end_pass` are the design's.
-// uses: colour fragment state
+// uses: colour fragment frame state
 
 var<private> opaque_depth: array<u32, SAMPLES>;
 var<private> opaque_winner: array<u32, SAMPLES>;

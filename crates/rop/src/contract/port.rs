@@ -5,10 +5,10 @@
 use std::fmt;
 
 use crate::contract::design::Design;
-use crate::contract::engine::{Engine, TileState, sites};
 use crate::contract::frame::Frame;
 use crate::contract::info::Info;
 use crate::contract::shader::Shader;
+use crate::contract::tiled::{TileState, TiledDesign, sites};
 use crate::contract::words::{
     Constant, Declaration, Field, OnDevice, PixelWords, Ranks, TileWords,
 };
@@ -37,7 +37,7 @@ pub struct Port {
     /// single precision.
     pub resolves: bool,
     /// The plain text.
-    pub plain: Box<dyn Engine>,
+    pub plain: Box<dyn TiledDesign>,
     restore: Box<Restore>,
 }
 

@@ -1,7 +1,7 @@
 // Twin of crates/rop/src/contract/samples.rs: the multisample buffer of one pixel, and the order of samples.
 // Colours wait until the pixel's fragments have all been drawn: until then it is known
 // which row won each sample.
-// uses: bindings colour fragment state
+// uses: bindings colour fragment frame state
 
 const NO_ROW: u32 = 0xffffffffu;
 const FAR: u32 = 0xffffffffu;

@@ -29,7 +29,7 @@ impl Normalise {
         matches!(self, Normalise::Depth | Normalise::Both)
     }
 
-    /// What [`Sums`] hold over so many columns: a transmittance each, and one sum of
+    /// What [`VisibilitySums`] hold over so many columns: a transmittance each, and one sum of
     /// colours, with one of alphas where these are scaled.
     pub fn layout(self, columns: u32, store: ColourStore) -> Layout {
         let columns = if self.by_alpha() { columns } else { 0 };
@@ -42,7 +42,7 @@ impl Normalise {
 
 /// What the second pass adds up.
 #[derive(Clone, Debug, Default)]
-pub struct Sums {
+pub struct VisibilitySums {
     /// `Π(1 − α)` in each column, once there is a fragment.
     passes: Vec<f32>,
     /// `U = Σ vis(z) α c` over fragments and columns.
@@ -51,16 +51,16 @@ pub struct Sums {
     alpha: f32,
 }
 
-impl Sums {
+impl VisibilitySums {
     /// The sums as a device holds them: whether there are any, four, and the columns'.
     pub fn read(normalise: Normalise, from: &PixelWords<'_>) -> Self {
         if from.word("SUMMED") == 0 {
-            return Sums::default();
+            return VisibilitySums::default();
         }
         let [r, g, b, alpha] = from.reals("SUM");
         let passes = from.field("PASSES").map(f32::from_bits);
         let passes = if normalise.by_alpha() { passes.collect() } else { Vec::new() };
-        Sums { passes, colour: [r, g, b], alpha }
+        VisibilitySums { passes, colour: [r, g, b], alpha }
     }
 
     /// Adds a fragment of which the columns that it covers show `visible`, all together.

@@ -2,9 +2,9 @@
 
 use crate::contract::contents::Contents;
 use crate::contract::design::Design;
-use crate::contract::engine::{Engine, TileState, Told};
 use crate::contract::event::{NoProbe, Record};
 use crate::contract::frame::{Frame, Site};
+use crate::contract::tiled::{Listener, TileState, TiledDesign};
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::tile::TileGrid;
 use screendoor_trace::trace::{Block, Fragment, SampleMask, Trace};
@@ -152,7 +152,7 @@ impl<'a> Fragments<'a> {
     }
 
     /// Refuses at once what would not fit, told over all passes, or take too long.
-    fn check(&self, design: &dyn Engine, limits: ExplainLimits) -> Result<()> {
+    fn check(&self, design: &dyn TiledDesign, limits: ExplainLimits) -> Result<()> {
         let fragments = self.count;
         let steps = (fragments * u64::from(design.passes())).min(limits.last as u64);
         let refuse = |why: String, left: u64, otherwise: &str| {
@@ -193,7 +193,7 @@ impl<'a> Fragments<'a> {
     /// each pass.
     fn draw(
         &self,
-        design: &dyn Engine,
+        design: &dyn TiledDesign,
         progress: &dyn Fn(u64),
         mut each: impl FnMut(u32, u64, Fragment, Record, &TileState),
     ) -> Result<(TileState, Vec<Record>)> {
@@ -207,11 +207,11 @@ impl<'a> Fragments<'a> {
                 let mut record = Record::default();
                 let mut one = Block::default();
                 one.push(&fragment);
-                design.draw(pass, &mut state, &one, Told::Record(&mut record));
+                design.draw(pass, &mut state, &one, Listener::Record(&mut record));
                 each(pass, row, fragment, record, &state);
             })?;
             let mut record = Record::default();
-            design.end_pass(pass, grid, tile, &mut state, Told::Record(&mut record));
+            design.end_pass(pass, grid, tile, &mut state, Listener::Record(&mut record));
             ended.push(record);
         }
         Ok((state, ended))
@@ -228,7 +228,7 @@ impl<'a> Fragments<'a> {
 /// # Errors
 /// As [`Trace::batch`]; [`Error::Config`] where that takes more than `limits` allow.
 pub fn explain(
-    design: &dyn Engine,
+    design: &dyn TiledDesign,
     frame: &Frame,
     trace: &Trace,
     site: Site,

@@ -16,11 +16,11 @@ mod options;
 mod unit;
 mod window;
 
-use crate::contract::engine::{Engine, TileState, Told};
+use crate::contract::tiled::{Listener, TileState, TiledDesign};
 use rayon::prelude::*;
 
 pub use explain::{ExplainLimits, Explanation, Step, draw_pixel, explain};
-pub use options::{ReplayOptions, Which};
+pub use options::{Implementation, ReplayOptions};
 
 use crate::contract::event::EventCounts;
 use crate::contract::frame::Frame;
@@ -55,7 +55,7 @@ pub struct Replayed {
 /// As [`Trace::batch`]; [`screendoor_trace::error::Error::Config`] where one pixel's fragments do not fit
 /// into the memory limit.
 pub fn replay(
-    design: &dyn Engine,
+    design: &dyn TiledDesign,
     frame: &Frame,
     trace: &Trace,
     options: &ReplayOptions<'_>,
@@ -111,7 +111,7 @@ pub fn replay(
 
 /// Ends a pass in all touched tiles; counts events where it is asked to.
 fn end_pass(
-    design: &dyn Engine,
+    design: &dyn TiledDesign,
     pass: u32,
     states: &mut TileMap<Option<TileState>>,
     count: bool,
@@ -120,8 +120,8 @@ fn end_pass(
     let end = |(tile, state): &mut (TileId, Option<TileState>)| {
         let mut counts = count.then(EventCounts::default);
         if let Some(state) = state {
-            let told = counts.as_mut().map_or(Told::Nobody, Told::Counts);
-            design.end_pass(pass, grid, *tile, state, told);
+            let listener = counts.as_mut().map_or(Listener::Nobody, Listener::Counts);
+            design.end_pass(pass, grid, *tile, state, listener);
         }
         counts
     };

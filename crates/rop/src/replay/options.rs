@@ -8,7 +8,7 @@ use screendoor_trace::param::Options;
 
 screendoor_trace::options! {
     /// Which of a design's implementations draws; they give the same bits.
-    pub enum Which {
+    pub enum Implementation {
         Fast = "fast": "the design's fast engine, where it has one, with what the machine has",
         Avx512 = "avx512": "the same with AVX-512 (x86)",
         Avx2 = "avx2": "the same with AVX2 (x86)",
@@ -18,7 +18,7 @@ screendoor_trace::options! {
     }
 }
 
-impl Which {
+impl Implementation {
     /// The instruction set of a fast engine; `None` for the reference.
     ///
     /// # Errors
@@ -26,11 +26,11 @@ impl Which {
     pub fn level(self) -> Result<Option<Level>> {
         let name = match self {
             // Without vector instructions the plain text is the faster one.
-            Which::Fast => {
+            Implementation::Fast => {
                 let best = levels().into_iter().find(|(_, level)| !level.is_fallback());
                 return Ok(best.map(|(_, level)| level));
             }
-            Which::Reference => return Ok(None),
+            Implementation::Reference => return Ok(None),
             _ => Self::CHOICES[self as usize].name,
         };
         match levels().into_iter().find(|(level, _)| *level == name) {
@@ -48,7 +48,7 @@ impl Which {
 #[derive(Clone, Copy)]
 pub struct ReplayOptions<'a> {
     /// Which implementation draws.
-    pub engine: Which,
+    pub implementation: Implementation,
     /// Whether to count events.
     pub count_events: bool,
     /// Fragments that are binned at a time, at most.
@@ -62,7 +62,7 @@ pub struct ReplayOptions<'a> {
 impl Default for ReplayOptions<'_> {
     fn default() -> Self {
         ReplayOptions {
-            engine: Which::Fast,
+            implementation: Implementation::Fast,
             count_events: false,
             window: 1 << 19,
             memory: 1 << 29,

@@ -9,9 +9,9 @@ use std::sync::Mutex;
 use fearless_simd::Level;
 use rayon::prelude::*;
 
-use crate::contract::engine::{Engine, TileState, Told};
 use crate::contract::event::EventCounts;
 use crate::contract::frame::Frame;
+use crate::contract::tiled::{Listener, TileState, TiledDesign};
 use crate::replay::group::Group;
 use crate::replay::unit::{Part, Sorter, Unit};
 use screendoor_trace::error::Result;
@@ -206,7 +206,7 @@ impl Window {
     /// events where it is asked to.
     pub fn draw(
         &self,
-        design: &dyn Engine,
+        design: &dyn TiledDesign,
         frame: &Frame,
         pass: u32,
         states: &mut TileMap<Option<TileState>>,
@@ -223,8 +223,8 @@ impl Window {
                 let mut counts = count.then(EventCounts::default);
                 self.for_each_block(work, frame, block, |block| {
                     let state = state.get_or_insert_with(|| design.clear(frame.grid, work.tile));
-                    let told = counts.as_mut().map_or(Told::Nobody, Told::Counts);
-                    design.draw(pass, state, block, told);
+                    let listener = counts.as_mut().map_or(Listener::Nobody, Listener::Counts);
+                    design.draw(pass, state, block, listener);
                 });
                 counts.unwrap_or_default()
             };

@@ -1,5 +1,5 @@
 // Twin of crates/rop/src/stochastic/dither.rs: one number a pixel and surface, even over neighbours.
-// uses: bindings random reference_value
+// uses: frame random reference_value
 
 const TILE: u32 = 64u;
 const RANK_BITS: u32 = 12u;

@@ -262,12 +262,12 @@ pub struct MethodsPixel<T, const N: usize> {
     pub(crate) samples: Samples<N>,
     pub(crate) state: T,
     /// What several passes need; `None` for a single one.
-    pub(crate) sums: Option<Box<Sums<N>>>,
+    pub(crate) sums: Option<Box<MethodsSums<N>>>,
 }
 
 /// What the methods of several passes keep.
 #[derive(Clone, Debug)]
-pub(crate) struct Sums<const N: usize> {
+pub(crate) struct MethodsSums<const N: usize> {
     /// `1 − α_total` of each sample; without correction, the share of the rounds in
     /// which the sample stayed empty.
     transmittance: [f32; N],
@@ -279,7 +279,7 @@ pub(crate) struct Sums<const N: usize> {
     weight: f32,
 }
 
-impl<const N: usize> Sums<N> {
+impl<const N: usize> MethodsSums<N> {
     /// Adds a colour `share` times, which counts as `weight`.
     fn add(&mut self, colour: [f32; 3], share: f32, weight: f32, store: ColourStore) {
         for (sum, c) in self.colour.iter_mut().zip(colour) {
@@ -365,7 +365,7 @@ impl<S: Sampler<N>, const N: usize> Methods<S, N> {
     /// E equation 5: the product of what the fragments let through.
     pub(crate) fn draw_alpha<P: Probe>(
         &self,
-        sums: &mut Sums<N>,
+        sums: &mut MethodsSums<N>,
         fragment: &Fragment,
         probe: &mut P,
     ) {
@@ -381,7 +381,7 @@ impl<S: Sampler<N>, const N: usize> Methods<S, N> {
     /// lies not behind, the `visible` ones.
     pub(crate) fn accumulate<P: Probe>(
         &self,
-        sums: &mut Sums<N>,
+        sums: &mut MethodsSums<N>,
         fragment: &Fragment,
         visible: SampleMask,
         probe: &mut P,
@@ -422,7 +422,7 @@ impl<S: Sampler<N>, const N: usize> Transparent<N> for Methods<S, N> {
     }
 
     fn clear(&self, site: Site) -> Self::Pixel {
-        let sums = Sums {
+        let sums = MethodsSums {
             transmittance: [if self.method.corrected() { 1.0 } else { 0.0 }; N],
             occupied: SampleMask::NONE,
             colour: [0.0; 3],
@@ -565,7 +565,7 @@ where
             let [r, g, b, weight] = from.reals("SUM");
             let occupied = SampleMask(from.mask("OCCUPIED"));
             let transmittance = from.reals("TRANSMITTANCE");
-            Box::new(Sums { transmittance, occupied, colour: [r, g, b], weight })
+            Box::new(MethodsSums { transmittance, occupied, colour: [r, g, b], weight })
         };
         MethodsPixel {
             samples: Samples::read(from, "DEPTH", "COLOUR"),

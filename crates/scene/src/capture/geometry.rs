@@ -32,7 +32,7 @@ pub(crate) struct Geometry<'a> {
     camera: &'a Camera,
     /// The number of each object's first triangle, and at the end the total.
     starts: Vec<u32>,
-    places: Vec<Place>,
+    places: Vec<Placement>,
 }
 
 impl<'a> Geometry<'a> {
@@ -43,7 +43,7 @@ impl<'a> Geometry<'a> {
             let count = scene.shapes[object.shape].triangle_count() as u32;
             starts.push(starts.last().expect("never empty") + count);
         }
-        let places = scene.objects.iter().map(|o| Place::new(o.place)).collect();
+        let places = scene.objects.iter().map(|o| Placement::new(o.place)).collect();
         Geometry { scene, camera, starts, places }
     }
 
@@ -75,14 +75,14 @@ impl<'a> Geometry<'a> {
 }
 
 /// Where an object's mesh stands in the scene.
-struct Place {
+struct Placement {
     points: DAffine3,
     normals: DMat3,
     /// A mirrored mesh winds the other way round (glTF 2.0, section 3.7.4).
     mirrored: bool,
 }
 
-impl Place {
+impl Placement {
     fn new(points: DAffine3) -> Self {
         let m = points.matrix3;
         let mirrored = m.determinant() < 0.0;
@@ -94,11 +94,11 @@ impl Place {
             m.z_axis.cross(m.x_axis) * sign,
             m.x_axis.cross(m.y_axis) * sign,
         );
-        Place { points, normals, mirrored }
+        Placement { points, normals, mirrored }
     }
 }
 
-fn mesh_triangle(mesh: &Mesh, local: u32, place: &Place) -> [Vertex; 3] {
+fn mesh_triangle(mesh: &Mesh, local: u32, place: &Placement) -> [Vertex; 3] {
     let mut corners = mesh.triangles[local as usize].map(|i| i as usize);
     if place.mirrored {
         corners.swap(1, 2);
@@ -257,7 +257,7 @@ mod tests {
 
     #[test]
     fn a_mirrored_object_keeps_its_outside() {
-        let place = Place::new(DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0)));
+        let place = Placement::new(DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0)));
         assert_eq!(place.normals * DVec3::X, -DVec3::X);
         assert_eq!(place.normals * DVec3::Z, DVec3::Z);
         // A triangle that faces +z, without normals of its own.

@@ -57,7 +57,7 @@ pub struct Errors {
 /// Where the frames differ in size.
 pub fn errors(picture: &Picture, reference: &Picture, region: &Region) -> Errors {
     assert_eq!(picture.grid(), reference.grid());
-    let mut sums = Sums::default();
+    let mut sums = ErrorSums::default();
     let mut visited = 0;
     for tile in picture.tiles_with(reference) {
         let (a, b) = (picture.tile(tile), reference.tile(tile));
@@ -78,14 +78,14 @@ pub fn errors(picture: &Picture, reference: &Picture, region: &Region) -> Errors
 }
 
 #[derive(Default)]
-struct Sums {
+struct ErrorSums {
     square: f64,
     square_srgb: f64,
     signed: f64,
     max: f64,
 }
 
-impl Sums {
+impl ErrorSums {
     fn add(&mut self, a: [f64; 3], b: [f64; 3]) {
         self.add_many(a, b, 1);
     }

@@ -43,7 +43,7 @@ impl Spectrum {
     /// Where the frames differ in size.
     pub fn of(picture: &Picture, reference: &Picture) -> Self {
         let (width, height) = (picture.width() as usize, picture.height() as usize);
-        let mut sums = Sums { power: [0.0; BINS], cells: [0; BINS], all: 0.0 };
+        let mut sums = PowerSums { power: [0.0; BINS], cells: [0; BINS], all: 0.0 };
         let pixels = width * height;
         if pixels > 1 {
             let mut transform = Transform::new(width, height);
@@ -104,7 +104,7 @@ impl Spectrum {
 }
 
 /// Sums of squared transforms over the bins, and over all frequencies but 0.
-struct Sums {
+struct PowerSums {
     power: [f64; BINS],
     cells: [u64; BINS],
     all: f64,
@@ -136,7 +136,7 @@ impl Transform {
     /// and the conjugate of R − i·S at −f. The two lie in one ring, and their squares add up
     /// to 2|R|² + 2|S|². At 0 and at the highest frequency of an even size, where R and S
     /// are real, the one square is |R|² + |S|².
-    fn add(&mut self, plane: &mut [f64], sums: &mut Sums) {
+    fn add(&mut self, plane: &mut [f64], sums: &mut PowerSums) {
         let (width, height) = (self.width, self.height);
         let half = width / 2 + 1;
         let mut row = self.along_rows.make_output_vec();

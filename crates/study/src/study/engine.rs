@@ -5,7 +5,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use screendoor_designs::Configured;
 use screendoor_gpu::{self as gpu, Adapter, Gpu, GpuOptions, GpuSeconds, Threads};
-use screendoor_rop::{ReplayOptions, Replayed, Which};
+use screendoor_rop::{Implementation, ReplayOptions, Replayed};
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::param::{Choice, Options};
 use screendoor_trace::trace::Trace;
@@ -14,7 +14,7 @@ use screendoor_trace::trace::Trace;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum EngineName {
     /// This machine's processor.
-    Cpu(Which),
+    Cpu(Implementation),
     /// A GPU.
     Gpu,
 }
@@ -24,15 +24,18 @@ const GPU: Choice = Choice { name: "gpu", help: "a GPU, for designs that have a 
 impl EngineName {
     /// All engines, with their names and what they are.
     pub fn all() -> impl Iterator<Item = (Self, Choice)> {
-        let of_cpu = Which::ALL.iter().zip(Which::CHOICES);
-        let of_cpu = of_cpu.map(|(which, choice)| (EngineName::Cpu(*which), *choice));
+        let of_cpu = Implementation::ALL.iter().zip(Implementation::CHOICES);
+        let of_cpu =
+            of_cpu.map(|(implementation, choice)| (EngineName::Cpu(*implementation), *choice));
         of_cpu.chain([(EngineName::Gpu, GPU)])
     }
 
     /// Its name.
     pub fn name(self) -> &'static str {
         match self {
-            EngineName::Cpu(which) => Which::CHOICES[which as usize].name,
+            EngineName::Cpu(implementation) => {
+                Implementation::CHOICES[implementation as usize].name
+            }
             EngineName::Gpu => GPU.name,
         }
     }
@@ -43,7 +46,7 @@ impl EngineName {
     /// As [`Gpu::open`]; [`Error::Config`] for an adapter that nothing runs on.
     pub fn open(self, adapter: Option<&str>) -> Result<Engine> {
         match (self, adapter) {
-            (EngineName::Cpu(which), None) => Ok(Engine::Cpu(which)),
+            (EngineName::Cpu(implementation), None) => Ok(Engine::Cpu(implementation)),
             (EngineName::Cpu(_), Some(_)) => Err(Error::config(
                 format_args!("an adapter was named, and the engine is '{}'", self.name()),
                 "add --engine gpu, or leave --adapter out",
@@ -79,13 +82,13 @@ impl<'de> Deserialize<'de> for EngineName {
 /// An engine that is ready.
 pub enum Engine {
     /// This machine's processor.
-    Cpu(Which),
+    Cpu(Implementation),
     /// A GPU, open, and what its threads are given.
     Gpu(Box<Gpu>, Threads),
 }
 
 /// This machine's processor, as fast as it can.
-pub const FAST: &Engine = &Engine::Cpu(Which::Fast);
+pub const FAST: &Engine = &Engine::Cpu(Implementation::Fast);
 
 /// What a GPU says of a replay.
 #[derive(Clone, Debug, Serialize)]
@@ -130,8 +133,8 @@ impl Engine {
         options: &ReplayOptions<'_>,
     ) -> Result<(Replayed, Option<OnGpu>)> {
         match self {
-            Engine::Cpu(which) => {
-                let options = ReplayOptions { engine: *which, ..*options };
+            Engine::Cpu(implementation) => {
+                let options = ReplayOptions { implementation: *implementation, ..*options };
                 Ok((design.replay(trace, samples, seed, &options)?, None))
             }
             Engine::Gpu(gpu, threads) => {

@@ -154,7 +154,7 @@ pub struct SceneEntry {
 /// What a study file need not say.
 mod defaults {
     use super::{EngineName, Faces, Metric, Order, PatternKind};
-    use screendoor_rop::Which;
+    use screendoor_rop::Implementation;
 
     /// Samples per pixel of the pictures that are kept, where there are so many.
     pub const PICTURES: u32 = 8;
@@ -163,7 +163,7 @@ mod defaults {
         8
     }
     pub fn engines() -> Vec<EngineName> {
-        vec![EngineName::Cpu(Which::Fast)]
+        vec![EngineName::Cpu(Implementation::Fast)]
     }
     pub fn timing() -> u32 {
         3

@@ -2,11 +2,11 @@
 
 use crate::contract::contents::Contents;
 use crate::contract::design::Design;
-use crate::contract::engine::{Engine, Listener, TileState, Told, sites};
 use crate::contract::event::{NoProbe, Probe, Sum};
 use crate::contract::frame::Site;
 use crate::contract::layout::Layout;
 use crate::contract::over_opaque::Transparent;
+use crate::contract::tiled::{Listener, TileState, TiledDesign, sites};
 use crate::lanes::{Count, Width};
 use crate::resolve::box_filter;
 use crate::stochastic::fast::kernel;
@@ -89,7 +89,7 @@ where
     state.downcast_mut().expect("the state is the engine's own")
 }
 
-impl<F: FastSampler<N>, const N: usize> Engine for FastEngine<F, N>
+impl<F: FastSampler<N>, const N: usize> TiledDesign for FastEngine<F, N>
 where
     Count<N>: Width,
 {
@@ -114,12 +114,12 @@ where
         Box::new(FastTile::<F, N>::cleared(frame, boxed(states), sums.as_deref(), opaque))
     }
 
-    fn draw(&self, pass: u32, state: &mut TileState, fragments: &Block, told: Told<'_>) {
+    fn draw(&self, pass: u32, state: &mut TileState, fragments: &Block, listener: Listener<'_>) {
         let tile = own::<F, N>(state);
-        match told {
-            Told::Nobody => self.draw_all(pass, tile, fragments, &mut NoProbe),
-            Told::Counts(counts) => self.draw_all(pass, tile, fragments, counts),
-            Told::Record(record) => {
+        match listener {
+            Listener::Nobody => self.draw_all(pass, tile, fragments, &mut NoProbe),
+            Listener::Counts(counts) => self.draw_all(pass, tile, fragments, counts),
+            Listener::Record(record) => {
                 for fragment in fragments.iter() {
                     record.fragment(fragment.coverage);
                     self.draw_plainly(pass, tile, &fragment, record);
@@ -134,13 +134,12 @@ where
         grid: TileGrid,
         tile: TileId,
         state: &mut TileState,
-        told: Told<'_>,
+        mut listener: Listener<'_>,
     ) {
         let state = own::<F, N>(state);
         if state.sums.is_empty() {
             return;
         }
-        let mut listener = Listener(told);
         for (within, site) in sites(grid, tile).enumerate() {
             self.change(state, within, |pixel| {
                 Design::end_pass(&self.plain, pass, site, pixel, &mut listener);

@@ -1,4 +1,27 @@
-//! The loops over a tile's fragments.
+//! The loops over a tile's fragments. With vectors in capitals, a lane for each sample of a
+//! pixel, and sets of samples as bits of a word:
+//!
+//! ```text
+//! for the block's fragments at once:                   (Prepared: a vector holds 16 fragments)
+//!     place in the tile, threshold ⌈α·2^32⌉, whether the plane is gentle
+//! for each fragment f, in API order:                   (from here a vector is a pixel)
+//!     if f's plane reaches the near end of the range:  plain text; next fragment
+//!     Z       = f.z + (f.dzdx·X + f.dzdy·Y) >> 4
+//!     passed  = f.coverage and not Z > DEPTH           (and before what is opaque)
+//!     if passed is empty and the rules let it:         next fragment
+//!     starts  = (passed or f.coverage) meets p.covered (choose: a new surface, figure 7)
+//!     first   = numbers that the surface has had       (0 where it starts)
+//!     V       = reference values of the numbers first, first + 1, …, all of them,
+//!               before it is known which sample has which
+//!     hits    = V < threshold                          (all or none of them: done)
+//!     R       = rank of each passed sample by DEPTH    (what it has stored: the sort)
+//!     written = passed and bit R of hits
+//!     DEPTH, RED, GREEN, BLUE = where written: f's, elsewhere as they are
+//! ```
+//!
+//! The plain text branches for each sample and looks up its value; here no branch depends on
+//! a sample. Of the same bits they are by construction: the numbers that a surface can have
+//! while it is found out which sample has which are one run, so that the values can come first.
 
 use fearless_simd::Simd;
 

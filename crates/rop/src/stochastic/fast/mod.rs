@@ -28,7 +28,7 @@ pub use references::{Base, FastReferences, HashBy, Numbered, PublishedHash};
 pub use sampler::{FastSampler, Loaded, Offered, Row};
 pub use state::FastTile;
 pub use tally::Tally;
-pub use tracked::{FastTracked, Given, Published, Rules, is_published};
+pub use tracked::{FastTracked, Parameterised, Published, Rules, is_published};
 pub use twin::FastEngine;
 #[cfg(test)]
 use twin::Flaw;

@@ -5,7 +5,7 @@ use crate::contract::over_opaque::OverOpaquePixel;
 use crate::contract::samples::Samples;
 use crate::lanes::{Count, Width};
 use crate::stochastic::fast::sampler::FastSampler;
-use crate::stochastic::methods::{MethodsPixel, Round, Sampler, Sums};
+use crate::stochastic::methods::{MethodsPixel, MethodsSums, Round, Sampler};
 use screendoor_trace::tile::TILE_PIXELS;
 use screendoor_trace::trace::Unorm32;
 
@@ -15,7 +15,7 @@ pub(super) const SIGN: u32 = 1 << 31;
 /// The samples of a pixel, quantity by quantity.
 #[repr(C, align(64))]
 #[derive(Clone, Copy)]
-pub(super) struct Held<W: Width> {
+pub(super) struct SampleRows<W: Width> {
     /// Depths, their upper bit flipped.
     pub depth: W::Row,
     /// Red, green and blue, as the bits of single-precision numbers.
@@ -27,10 +27,10 @@ pub struct FastTile<F: FastSampler<N>, const N: usize>
 where
     Count<N>: Width,
 {
-    pub(super) held: Box<[Held<Count<N>>; TILE_PIXELS]>,
+    pub(super) held: Box<[SampleRows<Count<N>>; TILE_PIXELS]>,
     pub(super) states: Box<[F::State; TILE_PIXELS]>,
     /// Empty where there is a single pass.
-    pub(super) sums: Vec<Option<Box<Sums<N>>>>,
+    pub(super) sums: Vec<Option<Box<MethodsSums<N>>>>,
     /// The round for which the states were made ready.
     pub(super) entered: Option<Round>,
     /// Empty where opaque fragments are drawn like all others.
@@ -47,10 +47,10 @@ pub(super) fn boxed<T>(pixels: Vec<T>) -> Box<[T; TILE_PIXELS]> {
 pub(super) type PlainPixel<F, const N: usize> =
     OverOpaquePixel<MethodsPixel<<<F as FastSampler<N>>::Plain as Sampler<N>>::State, N>, N>;
 
-impl<W: Width> Held<W> {
+impl<W: Width> SampleRows<W> {
     pub fn cleared(frame: &Frame) -> Self {
         let far = (Unorm32::FAR.0 ^ SIGN) as i32;
-        Held {
+        SampleRows {
             depth: W::row(|_| far),
             colour: frame.background.map(|c| W::row(|_| c.to_bits() as i32)),
         }
@@ -65,12 +65,12 @@ where
     pub(super) fn cleared(
         frame: &Frame,
         states: Box<[F::State; TILE_PIXELS]>,
-        sums: Option<&Sums<N>>,
+        sums: Option<&MethodsSums<N>>,
         opaque: bool,
     ) -> Self {
         let sums = sums.map(|sums| vec![Some(Box::new(sums.clone())); TILE_PIXELS]);
         FastTile {
-            held: boxed(vec![Held::cleared(frame); TILE_PIXELS]),
+            held: boxed(vec![SampleRows::cleared(frame); TILE_PIXELS]),
             states,
             sums: sums.unwrap_or_default(),
             entered: None,

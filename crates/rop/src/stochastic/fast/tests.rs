@@ -6,8 +6,8 @@ use screendoor_trace::tile::{TileGrid, TileId};
 use screendoor_trace::trace::{Block, DepthPlane, Fragment, SampleMask, Unorm32};
 
 use crate::contract::contents::Contents;
-use crate::contract::engine::{Engine, Told};
 use crate::contract::frame::Frame;
+use crate::contract::tiled::{Listener, TiledDesign};
 use crate::fast::{Count, FastEngine, FastTracked, Flaw, Published, PublishedHash, Width, levels};
 use crate::stochastic::single_pass;
 use crate::tracked::{
@@ -51,12 +51,12 @@ fn fragments(samples: u32) -> Vec<Fragment> {
 }
 
 /// What the pixels hold after every few fragments.
-fn held(engine: &dyn Engine, samples: u32) -> Vec<Contents> {
+fn held(engine: &dyn TiledDesign, samples: u32) -> Vec<Contents> {
     let (grid, tile) = (TileGrid::new(16, 16), TileId(0));
     let mut state = engine.clear(grid, tile);
     let mut list = Vec::new();
     for part in fragments(samples).chunks(20).flat_map(Block::all_of) {
-        engine.draw(0, &mut state, &part, Told::Nobody);
+        engine.draw(0, &mut state, &part, Listener::Nobody);
         list.extend((0..usize::from(PIXELS)).map(|within| engine.contents(&state, within)));
     }
     list

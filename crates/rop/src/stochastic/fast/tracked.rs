@@ -79,9 +79,9 @@ impl Rules for Published {
 
 /// Any parameters.
 #[derive(Clone, Copy, Debug)]
-pub struct Given(Switches);
+pub struct Parameterised(Switches);
 
-impl Rules for Given {
+impl Rules for Parameterised {
     type More = (u32, Option<u32>);
 
     #[inline(always)]
@@ -106,7 +106,7 @@ impl Rules for Given {
 /// them.
 pub fn is_published(values: &Values) -> bool {
     let Switches { sort, compact, surfaces, track, prehash, depth_bits } =
-        Given::of(values).switches();
+        Parameterised::of(values).switches();
     sort && compact
         && surfaces == SurfaceRule::Bitmask
         && track == Tracked::Survivors
@@ -115,10 +115,10 @@ pub fn is_published(values: &Values) -> bool {
         && values.get(REFERENCE) == Reference::Lk2011
 }
 
-impl Given {
+impl Parameterised {
     /// As `values` say.
     pub fn of(values: &Values) -> Self {
-        Given(Switches {
+        Parameterised(Switches {
             sort: values.get(SORT),
             compact: values.get(COMPACT),
             surfaces: values.get(SURFACES),

@@ -5,7 +5,7 @@ use glam::{Affine2, Vec2, Vec3, Vec4};
 use super::Loader;
 use super::document::shortened;
 use super::json::{self, TextureInfo};
-use super::told::Matter;
+use super::warnings::Matter;
 use crate::scene::texture::Encoding;
 use crate::scene::{AlphaMode, Material, TextureUse};
 use screendoor_trace::error::{Result, one_line};
@@ -78,7 +78,7 @@ impl Loader<'_> {
         let unlit = extensions.has("KHR_materials_unlit");
 
         let mut gathered =
-            Gathered { matters: self.told.extensions(extensions.names()), sets: Vec::new() };
+            Gathered { matters: self.warnings.extensions(extensions.names()), sets: Vec::new() };
         self.tell_unread(said, &mut gathered);
         // The older extension says in its own way what is in the core now.
         let pbr = &said.pbr_metallic_roughness;
@@ -141,7 +141,7 @@ impl Loader<'_> {
         ];
         for (_, name, instead) in unread.iter().filter(|(info, ..)| info.is_some()) {
             let what = format_args!("{name} textures are not read: {instead}");
-            gathered.matters.push(self.told.matter(what));
+            gathered.matters.push(self.warnings.matter(what));
         }
     }
 
@@ -153,7 +153,7 @@ impl Loader<'_> {
         part: &str,
     ) -> Result<Option<TextureUse>> {
         let Some(info) = info else { return Ok(None) };
-        gathered.matters.extend(self.told.extensions(info.extensions.names()));
+        gathered.matters.extend(self.warnings.extensions(info.extensions.names()));
         let transform: Option<json::TextureTransform> =
             self.said(&info.extensions, "KHR_texture_transform", part)?;
         let set = transform.as_ref().and_then(|t| t.tex_coord).unwrap_or(info.tex_coord);
@@ -181,7 +181,7 @@ impl Loader<'_> {
                     "materials that use more than {SETS} sets of texture coordinates are drawn \
                      with the first {SETS}"
                 );
-                gathered.matters.push(self.told.matter(what));
+                gathered.matters.push(self.warnings.matter(what));
                 0
             }
         };

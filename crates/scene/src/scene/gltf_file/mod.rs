@@ -11,7 +11,7 @@ mod material;
 mod pose;
 mod primitive;
 mod texture;
-mod told;
+mod warnings;
 
 use std::borrow::Cow;
 use std::cell::RefCell;
@@ -25,7 +25,7 @@ use self::json::{Node, Root};
 use self::material::Made;
 use self::primitive::{Drawn, Posed};
 use self::texture::TextureKey;
-use self::told::{Matter, Told};
+use self::warnings::{Matter, Warnings};
 use crate::scene::folder::Folder;
 use crate::scene::{Object, Scene, file, file_name};
 use screendoor_trace::error::{Error, Result, one_line};
@@ -53,7 +53,7 @@ pub(super) fn load(path: &Path, folder: &Folder) -> Result<Scene> {
         parents: pose::parents(&root),
         animated: pose::animated(&root),
         seen: vec![false; root.nodes.len()],
-        told: Told::new(&place),
+        warnings: Warnings::new(&place),
         animations: None,
         place,
         elements: 0,
@@ -62,7 +62,7 @@ pub(super) fn load(path: &Path, folder: &Folder) -> Result<Scene> {
     loader.buffers = loader.read_buffers(blob)?;
     loader.draw()?;
     let mut scene = loader.scene;
-    scene.warnings.extend(loader.told.warnings());
+    scene.warnings.extend(loader.warnings.warnings());
     Ok(Scene { files: loader.files.into_inner(), ..scene })
 }
 
@@ -87,7 +87,7 @@ struct Loader<'a> {
     /// Which nodes the scene has.
     seen: Vec<bool>,
     /// What is not drawn.
-    told: Told,
+    warnings: Warnings,
     /// That animations are not played, where there are any.
     animations: Option<Matter>,
     /// Vertex attributes and indices read so far, and zeros that no bytes stand for.
@@ -163,10 +163,10 @@ impl<'a> Loader<'a> {
         if root.scenes.len() > 1 {
             let name = one_line(scene.name.as_deref().unwrap_or(""));
             let what = format_args!("of its {} scenes only '{name}' is drawn", root.scenes.len());
-            let others = self.told.matter_of("other scene", what);
-            self.told.concerns([others], root.scenes.len() - 1);
+            let others = self.warnings.matter_of("other scene", what);
+            self.warnings.concerns([others], root.scenes.len() - 1);
         }
-        self.told.extensions(scene.extensions.names());
+        self.warnings.extensions(scene.extensions.names());
         let played = match &root.animations[..] {
             [] => None,
             [one] => {
@@ -175,13 +175,13 @@ impl<'a> Loader<'a> {
             }
             all => Some(format!("its {} animations are not played", all.len())),
         };
-        self.animations = played.map(|what| self.told.matter(what));
+        self.animations = played.map(|what| self.warnings.matter(what));
         for index in &scene.nodes {
             let above = Above { place: DMat4::IDENTITY, depth: 0, moved: false };
             self.node(*index, above, "the scene")?;
         }
         // What is declared and stands nowhere that is drawn.
-        self.told.extensions(root.extensions_used.iter().map(String::as_str));
+        self.warnings.extensions(root.extensions_used.iter().map(String::as_str));
         Ok(())
     }
 
@@ -226,7 +226,7 @@ impl<'a> Loader<'a> {
     fn place_mesh(&mut self, mesh: usize, index: usize, node: &Node, here: Above) -> Result<()> {
         let part = format!("node {index}");
         let drawn = self.mesh(mesh, index, node)?;
-        let mut matters = self.told.extensions(node.extensions.names());
+        let mut matters = self.warnings.extensions(node.extensions.names());
         if here.moved || self.moves_by_skin(node) {
             matters.extend(self.animations);
         }
@@ -238,8 +238,8 @@ impl<'a> Loader<'a> {
                 // Where its joints are says where it stands.
                 Some(all) if drawn.in_scene => {
                     let what = "the instances of a mesh with a skin are drawn as one";
-                    let matter = self.told.matter(what);
-                    self.told.concerns([matter], drawn.items.saturating_mul(all.len() - 1));
+                    let matter = self.warnings.matter(what);
+                    self.warnings.concerns([matter], drawn.items.saturating_mul(all.len() - 1));
                     (DMat4::IDENTITY, None)
                 }
                 _ if drawn.in_scene => (DMat4::IDENTITY, None),
@@ -248,7 +248,7 @@ impl<'a> Loader<'a> {
             let place = DAffine3::from_mat4(place);
             let count = instances.map_or(1, Vec::len);
             let all = matters.iter().chain(&drawn.matters).copied();
-            self.told.concerns(all, drawn.items.saturating_mul(count));
+            self.warnings.concerns(all, drawn.items.saturating_mul(count));
             let Some(shape) = drawn.shape else { continue };
             if self.scene.objects.len() + count > MAX_OBJECTS {
                 let what = format!("it has more than {MAX_OBJECTS} objects up to here");

@@ -8,7 +8,7 @@ use super::accessor::{Kind, Normalised, Numbers, Type};
 use super::json::{Attributes, Node, Primitive};
 use super::material::{Made, SETS};
 use super::pose::{Bound, Joints, Set, normal_matrix};
-use super::told::Matter;
+use super::warnings::Matter;
 use crate::scene::{Mesh, Shape};
 use screendoor_trace::error::Result;
 
@@ -98,7 +98,7 @@ impl Loader<'_> {
         for (i, primitive) in said.primitives.iter().enumerate() {
             let part = format!("mesh {mesh}, primitive {i}");
             let mut one = self.primitive(primitive, weights, joints.as_ref(), &part)?;
-            one.matters.extend(self.told.extensions(said.extensions.names()));
+            one.matters.extend(self.warnings.extensions(said.extensions.names()));
             drawn.push(one);
         }
         self.meshes.insert(posed, drawn.clone());
@@ -128,7 +128,7 @@ impl Loader<'_> {
             Mode::Lines => "line",
             _ => "triangle",
         };
-        let mut matters = self.told.extensions_of(unit, primitive.extensions.names());
+        let mut matters = self.warnings.extensions_of(unit, primitive.extensions.names());
         if let Some(missed) = self.not_drawn(primitive, mode, unit) {
             matters.push(missed);
             let items = self.claimed_items(primitive, mode);
@@ -158,8 +158,9 @@ impl Loader<'_> {
             Some(joints) => self.bind(&mut vertices, &mut triangles, primitive, joints, part)?,
         };
         if joints.is_some() && !in_scene {
-            matters
-                .push(self.told.matter("primitives that no joint holds stand without their skin"));
+            matters.push(
+                self.warnings.matter("primitives that no joint holds stand without their skin"),
+            );
         }
         let Vertices { positions, normals, uvs: [uvs, more_uvs], colours } = vertices;
         let items = triangles.len();
@@ -177,8 +178,8 @@ impl Loader<'_> {
         unit: &'static str,
     ) -> Option<Matter> {
         match mode {
-            Mode::Points => return Some(self.told.matter_of(unit, "points are not drawn")),
-            Mode::Lines => return Some(self.told.matter_of(unit, "lines are not drawn")),
+            Mode::Points => return Some(self.warnings.matter_of(unit, "points are not drawn")),
+            Mode::Lines => return Some(self.warnings.matter_of(unit, "lines are not drawn")),
             _ => {}
         }
         let position = primitive.attributes.get("POSITION");
@@ -187,10 +188,10 @@ impl Loader<'_> {
         let empty = |a: &super::json::Accessor| a.buffer_view.is_none() && a.sparse.is_none();
         if primitive.extensions.has(packed) && accessor.is_none_or(empty) {
             let what = format_args!("{packed} is not read: what it packs is not drawn");
-            return Some(self.told.matter(what));
+            return Some(self.warnings.matter(what));
         }
         let what = "primitives without positions are not drawn";
-        position.is_none().then(|| self.told.matter(what))
+        position.is_none().then(|| self.warnings.matter(what))
     }
 
     /// How many triangles, points or lines a primitive that is not read claims to have.
@@ -249,7 +250,7 @@ impl Loader<'_> {
         let (set, _) = missing.filter(|_| made.textured)?;
         let what =
             format_args!("the texture coordinates TEXCOORD_{set} of materials are not there");
-        Some(self.told.matter(what))
+        Some(self.warnings.matter(what))
     }
 
     /// Moves vertices by the morph targets, each as far as its weight says.

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use super::Loader;
 use super::extensions::TEXTURE_SOURCES;
 use super::json::{Sampler, TextureSource};
-use super::told::Matter;
+use super::warnings::Matter;
 use crate::scene::image_file;
 use crate::scene::texture::Encoding;
 use crate::scene::{Filter, Sampling, Texture, Wrap};
@@ -48,7 +48,7 @@ impl Loader<'_> {
             let what = format!("its sampler's {name} {value} is not one that glTF allows");
             self.bad(&part, what, "export the file again")
         })?;
-        let mut matters = self.told.extensions(said.extensions.names());
+        let mut matters = self.warnings.extensions(said.extensions.names());
         // What an extension names comes first, where it is read; the core's is for readers
         // without it.
         let mut images = Vec::new();
@@ -66,7 +66,7 @@ impl Loader<'_> {
         // An image that only an extension names is told already.
         let elsewhere = TEXTURE_SOURCES.iter().any(|name| said.extensions.has(name));
         if images.is_empty() && !elsewhere {
-            matters.push(self.told.matter(format_args!("{part} names no image")));
+            matters.push(self.warnings.matter(format_args!("{part} names no image")));
         }
         Ok((None, matters))
     }
@@ -83,7 +83,7 @@ impl Loader<'_> {
             .and_then(|bytes| image_file::decode(&bytes, &place))
             .map(|image| Texture::from_image(image, key.encoding))
             .and_then(|texture| self.scene.add_texture(texture.sampled(key.sampling)));
-        let made = decoded.map_err(|e| self.told.error(&e));
+        let made = decoded.map_err(|e| self.warnings.error(&e));
         self.textures.insert(key, made);
         made
     }

@@ -30,7 +30,7 @@ use crate::study::stress::judge::Judge;
 use screendoor_designs::{Configured, DESIGNS, configure};
 use screendoor_gpu::{self as gpu, Gpu, GpuOptions, TOLERANCE};
 use screendoor_rop::stochastic::{METHOD, Method};
-use screendoor_rop::{Promise, ReplayOptions, Which, colour};
+use screendoor_rop::{Implementation, Promise, ReplayOptions, colour};
 use screendoor_trace::error::Result;
 use screendoor_trace::param::Options;
 use screendoor_trace::picture::Picture;
@@ -273,14 +273,17 @@ fn series(design: &Configured) -> Series {
 }
 
 /// Engines of the processor that are held against the plain text.
-fn others() -> impl Iterator<Item = (Which, &'static str)> {
-    let all = Which::ALL.iter().zip(Which::CHOICES).map(|(which, choice)| (*which, choice.name));
-    all.filter(|(which, _)| *which != Which::Reference && which.level().is_ok())
+fn others() -> impl Iterator<Item = (Implementation, &'static str)> {
+    let all = Implementation::ALL
+        .iter()
+        .zip(Implementation::CHOICES)
+        .map(|(which, choice)| (*which, choice.name));
+    all.filter(|(which, _)| *which != Implementation::Reference && which.level().is_ok())
 }
 
 fn engines(gpu: Option<&Gpu>) -> Vec<String> {
     let gpu = gpu.map(|gpu| gpu.adapter().to_string());
-    let plain = Which::CHOICES[Which::Reference as usize].name.to_string();
+    let plain = Implementation::CHOICES[Implementation::Reference as usize].name.to_string();
     [plain].into_iter().chain(others().map(|(_, name)| name.to_string())).chain(gpu).collect()
 }
 
@@ -295,7 +298,7 @@ struct Trial<'a> {
 impl Trial<'_> {
     /// What the processor's engines make of it, and the plain text's first picture.
     fn finding(&self, design: &Configured) -> (Finding, Result<Picture>) {
-        let plain = self.picture(design, Which::Reference, 0);
+        let plain = self.picture(design, Implementation::Reference, 0);
         let mut finding = Finding {
             case: self.case.name.clone(),
             design: design.label(),
@@ -305,15 +308,20 @@ impl Trial<'_> {
         };
         for (which, name) in others() {
             // What draws on this machine, and with small cases all that can.
-            if which == Which::Fast || self.case.is_light() {
+            if which == Implementation::Fast || self.case.is_light() {
                 finding.engines.push(agreement(name, &plain, self.picture(design, which, 0)));
             }
         }
         (finding, plain)
     }
 
-    fn picture(&self, design: &Configured, engine: Which, seed: u32) -> Result<Picture> {
-        let options = ReplayOptions { engine, ..ReplayOptions::default() };
+    fn picture(
+        &self,
+        design: &Configured,
+        implementation: Implementation,
+        seed: u32,
+    ) -> Result<Picture> {
+        let options = ReplayOptions { implementation, ..ReplayOptions::default() };
         Ok(design.replay(&self.trace, self.case.samples, seed, &options)?.picture)
     }
 
@@ -341,7 +349,7 @@ impl Trial<'_> {
     /// What a design promises where `tied` fragments share a depth.
     fn promised(&self, design: &Configured, tied: u64) -> Result<OnCase> {
         let frame = design.frame(&self.trace, self.case.samples, 0)?;
-        let passes = design.build(&frame, Which::Reference)?.passes();
+        let passes = design.build(&frame, Implementation::Reference)?.passes();
         let unbiased = design.promises().unbiased.holds(tied);
         Ok(OnCase { unbiased, finite: unbiased && passes == 1 })
     }
@@ -353,7 +361,7 @@ impl Trial<'_> {
         let single = (colour::PARAM.param.name.to_string(), "32".to_string());
         let wide = configure(&design.label(), &[single]).ok()?;
         let narrow = self.case.colour == ColourFormat::F16;
-        narrow.then(|| self.outcome(&wide, &self.picture(&wide, Which::Reference, 0)))
+        narrow.then(|| self.outcome(&wide, &self.picture(&wide, Implementation::Reference, 0)))
     }
 
     fn on_gpu(&self, gpu: &Gpu, design: &Configured, plain: &Result<Picture>) -> Agreement {

@@ -8,7 +8,7 @@ use screendoor_trace::error::Error;
 
 /// Collects what is to be told.
 #[derive(Default)]
-pub(super) struct Told {
+pub(super) struct Warnings {
     /// The file.
     place: String,
     numbers: HashMap<String, Matter>,
@@ -19,10 +19,10 @@ pub(super) struct Told {
 /// One of the things that are told, by its number.
 pub(super) type Matter = usize;
 
-impl Told {
+impl Warnings {
     /// Nothing yet of the file at `place`.
     pub fn new(place: &str) -> Self {
-        Told { place: place.to_string(), ..Told::default() }
+        Warnings { place: place.to_string(), ..Warnings::default() }
     }
 
     /// The matter of the file that is told as `what`, which concerns no triangle yet.
@@ -94,14 +94,14 @@ mod tests {
 
     #[test]
     fn a_matter_is_told_once_with_all_of_its_triangles() {
-        let mut told = Told::new("a.gltf");
+        let mut warnings = Warnings::new("a.gltf");
         let names = ["KHR_materials_ior", "KHR_materials_unlit", "ACME_glow", "KHR_xmp"];
-        let matters = told.extensions(names);
-        assert_eq!(matters, told.extensions(names));
-        told.concerns(matters.iter().chain(&matters).copied(), 3);
-        told.concerns([matters[0]], 4);
-        told.matter("its 2 animations are not played");
-        let warnings: Vec<String> = told.warnings().collect();
+        let matters = warnings.extensions(names);
+        assert_eq!(matters, warnings.extensions(names));
+        warnings.concerns(matters.iter().chain(&matters).copied(), 3);
+        warnings.concerns([matters[0]], 4);
+        warnings.matter("its 2 animations are not played");
+        let warnings: Vec<String> = warnings.warnings().collect();
         assert_eq!(
             warnings,
             [

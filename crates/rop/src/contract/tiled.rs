@@ -16,7 +16,7 @@ use screendoor_trace::trace::Block;
 pub type TileState = Box<dyn Any + Send>;
 
 /// A design, tile by tile: a few dynamic calls for many fragments, none for each.
-pub trait Engine: Send + Sync {
+pub trait TiledDesign: Send + Sync {
     /// As [`Design::passes`].
     fn passes(&self) -> u32;
     /// As [`Design::layout`].
@@ -30,7 +30,7 @@ pub trait Engine: Send + Sync {
     /// A cleared tile.
     fn clear(&self, grid: TileGrid, tile: TileId) -> TileState;
     /// Draws fragments of one tile, in this order; rows that cover nothing are none.
-    fn draw(&self, pass: u32, state: &mut TileState, fragments: &Block, told: Told<'_>);
+    fn draw(&self, pass: u32, state: &mut TileState, fragments: &Block, listener: Listener<'_>);
     /// Ends a pass for a tile.
     fn end_pass(
         &self,
@@ -38,7 +38,7 @@ pub trait Engine: Send + Sync {
         grid: TileGrid,
         tile: TileId,
         state: &mut TileState,
-        told: Told<'_>,
+        listener: Listener<'_>,
     );
     /// The colours of a tile.
     fn resolve(&self, grid: TileGrid, tile: TileId, state: &TileState) -> TilePixels;
@@ -48,7 +48,7 @@ pub trait Engine: Send + Sync {
 
 /// Who is told what happens.
 #[derive(Debug)]
-pub enum Told<'a> {
+pub enum Listener<'a> {
     /// Nobody.
     Nobody,
     /// A tally.
@@ -57,7 +57,7 @@ pub enum Told<'a> {
     Record(&'a mut Record),
 }
 
-impl<D: Design> Engine for D {
+impl<D: Design> TiledDesign for D {
     fn passes(&self) -> u32 {
         Design::passes(self)
     }
@@ -76,12 +76,18 @@ impl<D: Design> Engine for D {
         Box::new(pixels)
     }
 
-    fn draw(&self, pass: u32, state: &mut TileState, fragments: &Block, told: Told<'_>) {
+    fn draw(
+        &self,
+        pass: u32,
+        state: &mut TileState,
+        fragments: &Block,
+        mut listener: Listener<'_>,
+    ) {
         let pixels = state.downcast_mut::<Vec<D::Pixel>>().expect("the state is the design's own");
-        match told {
-            Told::Nobody => draw_all(self, pass, pixels, fragments, &mut NoProbe),
-            Told::Counts(_) | Told::Record(_) => {
-                draw_all(self, pass, pixels, fragments, &mut Listener(told));
+        match listener {
+            Listener::Nobody => draw_all(self, pass, pixels, fragments, &mut NoProbe),
+            Listener::Counts(_) | Listener::Record(_) => {
+                draw_all(self, pass, pixels, fragments, &mut listener);
             }
         }
     }
@@ -92,10 +98,9 @@ impl<D: Design> Engine for D {
         grid: TileGrid,
         tile: TileId,
         state: &mut TileState,
-        told: Told<'_>,
+        mut listener: Listener<'_>,
     ) {
         let pixels = state.downcast_mut::<Vec<D::Pixel>>().expect("the state is the design's own");
-        let mut listener = Listener(told);
         for (site, pixel) in sites(grid, tile).zip(pixels) {
             Design::end_pass(self, pass, site, pixel, &mut listener);
         }
@@ -140,16 +145,13 @@ pub(crate) fn sites(grid: TileGrid, tile: TileId) -> impl Iterator<Item = Site> 
     })
 }
 
-/// One probe for all who listen: designs are compiled for it and for nobody.
-pub(crate) struct Listener<'a>(pub Told<'a>);
-
 impl Listen for Listener<'_> {
     #[inline(never)]
     fn event(&mut self, event: Event<'_>) {
-        match &mut self.0 {
-            Told::Nobody => {}
-            Told::Counts(counts) => counts.event(event),
-            Told::Record(record) => record.event(event),
+        match self {
+            Listener::Nobody => {}
+            Listener::Counts(counts) => counts.event(event),
+            Listener::Record(record) => record.event(event),
         }
     }
 }
