@@ -58,6 +58,7 @@ impl Needs {
             background: [0.0; 3],
             seed: 0,
             colour_bits: 48,
+            view: None,
             opaque,
             primitive_depths: Some(Arc::default()),
             columns: Default::default(),

@@ -7,7 +7,8 @@ use clap::Args;
 use crate::cli::console::{Console, grouped, shown};
 use crate::cli::files::{JsonArgument, check, open_trace, report};
 use crate::error::Result;
-use crate::trace::{Checksums, Header, Statistics, Trace, statistics_within};
+use crate::param::Options;
+use crate::trace::{Checksums, Header, Statistics, Trace, View, statistics_within};
 
 /// Show what a user wants to know first about a trace
 #[derive(Debug, Args)]
@@ -77,6 +78,9 @@ fn print(trace: &Trace, stats: &Statistics, console: &Console) -> Result<()> {
     console.print(format_args!("{}", shown(trace.place())))?;
     line("source", header.source.clone())?;
     line("camera", header.camera.clone())?;
+    for (name, value) in header.view.iter().flat_map(view_lines) {
+        line(name, value)?;
+    }
     line("frame", format!("{} x {} pixels", header.width, header.height))?;
     let nested = if header.pattern.nested { ", serves every smaller count" } else { "" };
     line("samples", format!("{} ({}{nested})", header.pattern.samples(), header.pattern.name))?;
@@ -166,6 +170,23 @@ fn print(trace: &Trace, stats: &Statistics, console: &Console) -> Result<()> {
         line(&format!("    {object}"), bar(*n, stats.fragments))?;
     }
     Ok(())
+}
+
+/// A view: its kind and planes, and its matrices row by row.
+fn view_lines(view: &View) -> Vec<(&'static str, String)> {
+    let View { near, far, .. } = view;
+    let kind = view.projection.name();
+    let mut lines = vec![("view", format!("{kind}, from {near:.6} to {far:.6} scene units"))];
+    for (name, matrix) in
+        [("  world to view", &view.world_to_view), ("  view to clip", &view.view_to_clip)]
+    {
+        for row in 0..4 {
+            let elements = matrix.iter().skip(row).step_by(4);
+            let text: String = elements.map(|v| format!("{v:>14.6}")).collect();
+            lines.push((if row == 0 { name } else { "" }, text));
+        }
+    }
+    lines
 }
 
 /// A bar of up to 30 characters with its figure.

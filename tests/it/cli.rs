@@ -81,8 +81,25 @@ fn a_scene_becomes_a_trace_a_picture_and_figures() {
     let fragments = info["statistics"]["fragments"].as_u64().unwrap();
     assert!(fragments > 1000);
     assert_eq!(info["header"]["width"], 48);
-    assert!(place.good(&["info", "t.arrow"]).contains("depth complexity"));
+    let said = place.good(&["info", "t.arrow"]);
+    assert!(said.contains("depth complexity"));
+    // The view, in numbers for programs and rounded for people.
+    let view = &info["header"]["view"];
+    let number = |key: &str| view[key].as_f64().unwrap();
+    assert!(view["projection"] == "orthographic" && number("near") < number("far"), "{view}");
+    for (key, name) in [("world_to_view", "world to view"), ("view_to_clip", "view to clip")] {
+        assert_eq!(view[key].as_array().unwrap().len(), 16);
+        let first = format!("  {name:<16}{:>14.6}", view[key][0].as_f64().unwrap());
+        assert!(said.contains(&first), "{first} in {said}");
+    }
+    let planes =
+        format!("orthographic, from {:.6} to {:.6} scene units", number("near"), number("far"));
+    assert!(said.contains(&planes), "{planes} in {said}");
     assert!(place.good(&["verify", "t.arrow"]).contains("hold"));
+    // A trace of before there were views.
+    let old = concat!(env!("CARGO_MANIFEST_DIR"), "/traces/ramps.arrow");
+    let info: Value = serde_json::from_str(&place.good(&["info", old, "--json", "-"])).unwrap();
+    assert!(info["header"]["view"].is_null() && !place.good(&["info", old]).contains("to clip"));
 
     let json = place.good(&[
         "replay",

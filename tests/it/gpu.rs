@@ -137,7 +137,7 @@ fn enderton_is_its_plain_text() {
 }
 
 /// The picture of a GPU and of the plain text.
-fn pictures(
+pub fn pictures(
     gpu: &Gpu,
     design: &Configured,
     trace: &Trace,
@@ -173,7 +173,7 @@ fn what_nothing_covers_is_the_background_bit_for_bit_on_a_device_too() {
 }
 
 /// Channels that differ by more than is allowed, and how many there are.
-fn differing([found, expected]: &[Picture; 2]) -> [usize; 2] {
+pub fn differing([found, expected]: &[Picture; 2]) -> [usize; 2] {
     let pixels = (0..expected.height()).flat_map(|y| (0..expected.width()).map(move |x| (x, y)));
     let channels = pixels.flat_map(|(x, y)| {
         let (found, expected) = (found.get(x, y), expected.get(x, y));

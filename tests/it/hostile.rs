@@ -97,7 +97,8 @@ pub fn parts(
 
 fn traces() -> Vec<Hostile> {
     const ROWS: usize = 123;
-    let header = header(32, 32, 8);
+    let viewed = header(32, 32, 8);
+    let header = Header { view: None, ..viewed.clone() };
     let options = WriteOptions { batch_rows: 64, ..WriteOptions::default() };
     let sealed = trace_bytes(&header, &random_fragments(&header, ROWS, 3), options);
     let flipped = |at: usize| {
@@ -183,6 +184,16 @@ fn traces() -> Vec<Hostile> {
             with_metadata("version", "2.0"),
             "format version 2.0",
             "a newer major version",
+        ),
+        hostile(
+            "view.arrow",
+            {
+                let (mut metadata, columns) = parts(&viewed, ROWS);
+                metadata.insert("screendoor.view.near".into(), "500".into());
+                arrow_file(metadata, columns, None)
+            },
+            "metadata 'screendoor.view.near'",
+            "a view whose near plane stands behind its far one",
         ),
         hostile(
             "huge-frame.arrow",

@@ -23,6 +23,8 @@ mod limits;
 mod loaders;
 mod measured;
 mod models;
+#[cfg(feature = "probe")]
+mod optional;
 mod python;
 mod results_document;
 mod seal;
@@ -30,3 +32,4 @@ mod stress;
 mod trace_file;
 mod unbiased;
 mod util;
+mod view;

@@ -47,7 +47,10 @@ fn find(bytes: &[u8], text: &str) -> Range<usize> {
 
 fn hash_of(metadata: &BTreeMap<String, String>, batches: &[RecordBatch]) -> String {
     let mut hasher = blake3::Hasher::new();
-    for (key, value) in metadata.iter().filter(|(key, _)| *key != "screendoor.checksums") {
+    let left_out = |key: &str| key == "screendoor.checksums" || key.starts_with("screendoor.view.");
+    for (key, value) in metadata.iter().filter(|(key, _)| !left_out(key)) {
+        let raised = key == "screendoor.version" && value == "1.1";
+        let value = if raised { "1.0" } else { value };
         hasher.update(format!("{key}={value}\n").as_bytes());
     }
     let rows: usize = batches.iter().map(RecordBatch::num_rows).sum();

@@ -13,8 +13,8 @@ use screendoor::picture::Picture;
 use screendoor::random::Stream;
 use screendoor::rop::{ReplayOptions, colour};
 use screendoor::trace::{
-    ColourFormat, DepthPlane, Fragment, Header, SampleMask, SamplePattern, Trace, TraceWriter,
-    Unorm32, WriteOptions,
+    ColourFormat, DepthPlane, Fragment, Header, Projection, SampleMask, SamplePattern, Trace,
+    TraceWriter, Unorm32, View, WriteOptions,
 };
 
 /// As [`header`], with colours in half precision, as captures have them by default.
@@ -22,7 +22,21 @@ pub fn half_header(width: u32, height: u32, samples: u32) -> Header {
     Header { colour: ColourFormat::F16, ..header(width, height, samples) }
 }
 
-/// A header for tests: `samples` samples at made-up places, black background.
+/// A view for tests: over a wide range, so that view depths differ much.
+pub fn view() -> View {
+    let (near, far) = (0.5, 200.0);
+    let (scale, offset) = (-far / (far - near), -far * near / (far - near));
+    View {
+        projection: Projection::Perspective,
+        near,
+        far,
+        world_to_view: [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.],
+        view_to_clip: [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., scale, -1., 0., 0., offset, 0.],
+    }
+}
+
+/// A header for tests: `samples` samples at made-up places, black background, and a view,
+/// which some parameters ask for.
 pub fn header(width: u32, height: u32, samples: u32) -> Header {
     let positions = (0..samples as i32).map(|s| [(s % 8 * 2 - 8) as i8, (s / 8 * 2 - 8) as i8]);
     Header {
@@ -38,6 +52,7 @@ pub fn header(width: u32, height: u32, samples: u32) -> Header {
         colour: ColourFormat::F32,
         source: "test".into(),
         camera: "none".into(),
+        view: Some(view()),
         ..Header::default()
     }
 }

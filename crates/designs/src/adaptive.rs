@@ -197,6 +197,7 @@ mod tests {
             background: [0.0; 3],
             seed: 0,
             colour_bits: 96,
+            view: None,
             opaque: true,
             primitive_depths: None,
             columns: Default::default(),

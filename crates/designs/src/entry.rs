@@ -6,6 +6,7 @@ use std::sync::Arc;
 use crate::DESIGNS;
 use screendoor_rop::fast::{Count, Width};
 use screendoor_rop::stochastic::draws_opaque_first;
+use screendoor_rop::view_depth::asks_for_view;
 use screendoor_rop::{
     Blueprint, ExplainLimits, Explanation, Frame, Implementation, Info, Layout, Port,
     PrimitiveDepths, Promises, ReplayOptions, Replayed, Site, StateBits, TiledDesign, explain,
@@ -148,6 +149,11 @@ impl Configured {
     /// What it promises.
     pub fn promises(&self) -> Promises {
         (self.entry.promises)(&self.values)
+    }
+
+    /// Whether it takes view depths from the trace's view, and refuses a trace that has none.
+    pub fn asks_for_view(&self) -> bool {
+        asks_for_view(&self.values)
     }
 
     /// Replays `trace` at `samples` samples per pixel.

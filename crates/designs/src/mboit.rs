@@ -58,7 +58,7 @@ impl Blueprint for MomentBased {
             moments: values.get(MOMENTS),
             bias: values.get(BIAS),
             overestimation: values.get(OVERESTIMATION),
-            depth: ViewDepth::of(values),
+            depth: ViewDepth::of(values, frame)?,
             coverage: accumulators::of(values),
             store: ColourStore::of(values, frame),
         };

@@ -86,6 +86,7 @@ mod tests {
             background: [1.0; 3],
             seed: 0,
             colour_bits: 48,
+            view: None,
             opaque: true,
             primitive_depths: None,
             columns: Default::default(),

@@ -72,7 +72,7 @@ impl Blueprint for WeightedBlended {
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
         let inner = WeightedBlendedAt {
             weight: values.get(WEIGHT),
-            depth: ViewDepth::of(values),
+            depth: ViewDepth::of(values, frame)?,
             coverage: accumulators::of(values),
             store: ColourStore::of(values, frame),
         };
@@ -194,6 +194,7 @@ impl<const N: usize> OnDevice<Accumulators<WeightedSums>> for WeightedBlendedAt<
         to.field("SUM_WEIGHT", sums);
         to.field("SUM_THROUGH", sums);
         to.iterations(sums);
+        self.depth.declare(to);
     }
 
     fn read(&self, _: Site, from: &PixelWords<'_>) -> Accumulators<WeightedSums> {
@@ -215,13 +216,13 @@ impl<const N: usize> OnDevice<Accumulators<WeightedSums>> for WeightedBlendedAt<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use screendoor_rop::view_depth::Lens;
+    use screendoor_trace::trace::Projection;
 
     #[test]
     fn weights_by_hand() {
         // At view depth 10: 10/(1e-5 + 4 + 1.5625e-8), 10/(1e-5 + 1 + …), and at a
         // depth of 1/2 of the range.
-        let depth = ViewDepth::new(10.0, 10.0, Lens::Parallel);
+        let depth = ViewDepth::new(10.0, 10.0, Projection::Orthographic);
         let near = |weight: Weight| weight.of(&depth, Unorm32::NEAR, 0.5);
         assert!((near(Weight::Eq7) - 0.5 * 2.499_993_7).abs() < 1e-6);
         assert!((near(Weight::Eq8) - 0.5 * 9.999_899_9).abs() < 1e-5);
@@ -231,7 +232,7 @@ mod tests {
         let middle = Weight::Eq10.of(&depth, Unorm32(1 << 31), 1.0);
         assert!((middle - 375.0).abs() < 1e-5);
         // Clamped at either end.
-        let wide = ViewDepth::new(1e-3, 1e6, Lens::Parallel);
+        let wide = ViewDepth::new(1e-3, 1e6, Projection::Orthographic);
         assert_eq!(Weight::Eq7.of(&wide, Unorm32::NEAR, 1.0), 3e3);
         assert_eq!(Weight::Eq7.of(&wide, Unorm32::FAR, 1.0), 1e-2);
     }
@@ -242,7 +243,7 @@ mod tests {
         // (2/3, 1/3, 0), the transmittance 3/8.
         let design = WeightedBlendedAt::<1> {
             weight: Weight::One,
-            depth: ViewDepth::new(1.0, 1.0, Lens::Parallel),
+            depth: ViewDepth::new(1.0, 1.0, Projection::Orthographic),
             coverage: Coverage::Sample,
             store: ColourStore::single(),
         };

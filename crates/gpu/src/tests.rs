@@ -15,8 +15,8 @@ use screendoor_rop::{Constant, Contents, Implementation, SHADERS};
 use screendoor_trace::param::Kind;
 use screendoor_trace::random::Stream;
 use screendoor_trace::trace::{
-    ColourFormat, ColumnId, DepthPlane, Fragment, Header, SampleMask, SamplePattern, Trace,
-    TraceWriter, Unorm32, WriteOptions,
+    ColourFormat, ColumnId, DepthPlane, Fragment, Header, Projection, SampleMask, SamplePattern,
+    Trace, TraceWriter, Unorm32, View, WriteOptions,
 };
 
 /// Checks a program as wgpu does before it hands it to a driver.
@@ -70,6 +70,20 @@ fn trace(samples: u32) -> Trace {
         colour: ColourFormat::F16,
         source: "test".to_string(),
         camera: "none".to_string(),
+        // Some parameters ask for one.
+        view: Some(View {
+            projection: Projection::Orthographic,
+            near: 0.0625,
+            far: 128.0625,
+            world_to_view: [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.],
+            view_to_clip: [
+                [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0],
+                [0.0, 0.0, -1.0 / 128.0, 0.0, 0.0, 0.0, -0.0625 / 128.0, 1.0],
+            ]
+            .concat()
+            .try_into()
+            .unwrap(),
+        }),
         ..Header::default()
     };
     let mut random = Stream::new([0xdef, samples]);

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use screendoor::random::Stream;
 use screendoor::study::record::Record;
+use screendoor::trace::{Header, Trace, TraceWriter, View};
 use serde_json::Value;
 
 use super::{PROGRAM, Workplace};
@@ -173,6 +174,13 @@ fn parts_of_different_studies_or_traces_are_refused() {
     let (code, error) = place.bad(&["merge", "m2", "a", "c"]);
     assert!(code == 1 && error.contains("different traces of scene 'glass'"), "{error}");
 
+    // The same fragments, seen from elsewhere.
+    place.good(&["study", "s.toml", "-o", "e", "--shard", "1/2"]);
+    let scene = place.path("e/scenes/glass.json");
+    rewrite(&scene, |facts| facts["view"]["far"] = 1e3.into());
+    let (code, error) = place.bad(&["merge", "m4", "a", "e"]);
+    assert!(code == 1 && error.contains("different traces of scene 'glass'"), "{error}");
+
     // Errors that differ: two versions of the program, say.
     place.good(&["study", "s.toml", "-o", "d", "--shard", "1/2"]);
     let run = place.path("d/runs/glass.4.lk.json");
@@ -180,9 +188,55 @@ fn parts_of_different_studies_or_traces_are_refused() {
     let (code, error) = place.bad(&["merge", "m3", "a", "d"]);
     assert!(code == 1 && error.contains("different errors for one run"), "{error}");
     // What is refused leaves no folder.
-    for folder in ["m", "m2", "m3"] {
+    for folder in ["m", "m2", "m3", "m4"] {
         assert!(!place.path(folder).exists(), "{folder}");
     }
+}
+
+#[test]
+fn a_trace_s_view_is_asked_for_and_stays_the_same() {
+    let place = Workplace::new();
+    let study = "
+name = 'viewed'
+designs = ['blend', 'wboit:lens=camera']
+samples = [4]
+seeds = 1
+timing = 0
+metrics = []
+[[scene]]
+name = 'ramps'
+trace = 't.arrow'
+";
+    fs::write(place.path("s.toml"), study).unwrap();
+    place.good(&["capture", "builtin:ramps", "-o", "good.arrow", "--size", "32x32"]);
+    let good = Trace::open(place.path("good.arrow")).unwrap();
+    let view = good.header().view.unwrap();
+    let with = |view: Option<View>| {
+        let header = Header { view, ..good.header().clone() };
+        let mut writer =
+            TraceWriter::create(place.path("t.arrow"), header, Default::default()).unwrap();
+        let fragments = good.batches().flat_map(|b| b.unwrap().iter().collect::<Vec<_>>());
+        fragments.for_each(|f| writer.push(&f).unwrap());
+        let (file, written) = writer.finish().unwrap();
+        file.commit().unwrap();
+        assert_eq!(Some(&written.content[..]), good.content());
+    };
+    with(None);
+    let (code, error) = place.bad(&["study", "s.toml", "-o", "out"]);
+    let words = "scene 'ramps': t.arrow does not say its view, for 'wboit:lens=camera'; capture";
+    assert!(code == 2 && error.contains(words), "{error}");
+    assert!(!place.path("out").exists());
+
+    with(Some(view));
+    place.good(&["study", "s.toml", "-o", "out", "--shard", "1/2"]);
+    // As if the eye had stood elsewhere before the same fragments.
+    let mut aside = view;
+    aside.world_to_view[12] += 1.0;
+    with(Some(aside));
+    let (code, error) = place.bad(&["study", "s.toml", "-o", "out"]);
+    assert!(code == 1 && error.contains("scene 'ramps' was another one"), "{error}");
+    with(Some(view));
+    place.good(&["study", "s.toml", "-o", "out"]);
 }
 
 #[test]

@@ -19,6 +19,7 @@ fn frame(samples: u32, random: &mut Stream) -> Frame {
         background: [0.25, -3.0, 1e30],
         seed: 0,
         colour_bits: 48,
+        view: None,
         opaque: true,
         primitive_depths: None,
         columns: Default::default(),

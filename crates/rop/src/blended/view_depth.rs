@@ -1,18 +1,22 @@
 //! View depth: how far a fragment lies before the camera.
 //!
-//! A trace holds depths as a depth buffer does, from the near plane to the far one,
-//! and does not say where these planes stand. Techniques whose formulas take the
-//! distance along the view axis are told so by parameters, in the units of their
-//! formulas.
+//! A trace holds depths as a depth buffer does, from the near plane to the far one.
+//! Techniques whose formulas take the distance along the view axis are told by parameters
+//! where these planes stand, in the units of their formulas; or they take it from the view
+//! of the trace ([`View`]), in the units of its scene.
 
+use crate::contract::frame::Frame;
+use crate::contract::words::{Constant, Declaration};
+use screendoor_trace::error::{Error, Result};
 use screendoor_trace::param::{Typed, Values};
-use screendoor_trace::trace::Unorm32;
+use screendoor_trace::trace::{Projection, Unorm32, View};
 
 screendoor_trace::options! {
-    /// How depth grows from the near plane to the far one.
+    /// How depth grows from the near plane to the far one, and where they stand.
     pub enum Lens {
-        Perspective = "perspective": "as a perspective camera's depth buffer does",
-        Parallel = "parallel": "in proportion, as along parallel lines of sight",
+        Perspective = "perspective": "as a perspective camera's depth buffer does, over near and range",
+        Parallel = "parallel": "in proportion, as along parallel lines of sight, over near and range",
+        Camera = "camera": "the trace's own projection: view depth from its near and far, in its scene's units",
     }
 }
 
@@ -26,23 +30,72 @@ pub const RANGE: Typed<f64> =
 pub const LENS: Typed<Lens> =
     Typed::choice("lens", "perspective", "how depth grows between the planes");
 
+/// The nearest and the furthest plane of a trace's own projection that view depths are taken
+/// of: so far squares and sixth powers stay numbers in single precision, too.
+const PLANES: (f64, f64) = (1e-6, 1e6);
+
+/// Whether a design asks for the view of its trace.
+pub fn asks_for_view(values: &Values) -> bool {
+    let has = values.iter().any(|(param, _)| param == LENS.param.name);
+    has && values.get(LENS) == Lens::Camera
+}
+
 /// What turns a stored depth into a view depth.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ViewDepth {
     near: f64,
     range: f64,
-    lens: Lens,
+    projection: Projection,
 }
 
 impl ViewDepth {
     /// From a near plane at view depth `near` > 0 over a `range` > 0.
-    pub fn new(near: f64, range: f64, lens: Lens) -> Self {
-        ViewDepth { near, range, lens }
+    pub fn new(near: f64, range: f64, projection: Projection) -> Self {
+        ViewDepth { near, range, projection }
     }
 
-    /// As the parameters say.
-    pub fn of(values: &Values) -> Self {
-        Self::new(values.get(NEAR), values.get(RANGE), values.get(LENS))
+    /// As the parameters say, for a trace of `frame`.
+    ///
+    /// # Errors
+    /// [`Error::Config`] where they ask for the trace's own projection, and the trace has
+    /// none, or one whose planes stand too near or too far.
+    pub fn of(values: &Values, frame: &Frame) -> Result<Self> {
+        let projection = match values.get(LENS) {
+            Lens::Perspective => Projection::Perspective,
+            Lens::Parallel => Projection::Orthographic,
+            Lens::Camera => return Self::of_view(frame.view.as_ref()),
+        };
+        Ok(Self::new(values.get(NEAR), values.get(RANGE), projection))
+    }
+
+    fn of_view(view: Option<&View>) -> Result<Self> {
+        let Some(view) = view else {
+            return Err(Error::config(
+                "lens=camera asks for the trace's own projection, which it does not say",
+                "capture the trace again, let its writer state the view \
+                 (docs/TRACE_FORMAT.md), or give lens=perspective or parallel with near and range",
+            ));
+        };
+        if view.near < PLANES.0 || view.far > PLANES.1 {
+            let (near, far) = (view.near, view.far);
+            return Err(Error::config(
+                format_args!("the trace's planes stand at view depths {near:?} and {far:?}"),
+                format_args!(
+                    "lens=camera takes {:?} to {:?}: change the scene's unit or where its view \
+                     begins, or give lens=perspective or parallel with near and range",
+                    PLANES.0, PLANES.1
+                ),
+            ));
+        }
+        Ok(Self::new(view.near, view.far - view.near, view.projection))
+    }
+
+    /// Declares what the shader's twin reads.
+    pub fn declare(&self, to: &mut Declaration) {
+        to.constant("VIEW_NEAR", Constant::Real(self.near as f32));
+        to.constant("VIEW_RANGE", Constant::Real(self.range as f32));
+        let parallel = self.projection == Projection::Orthographic;
+        to.constant("VIEW_PARALLEL", Constant::Flag(parallel));
     }
 
     /// The view depth of `z`, between those of the two planes.
@@ -62,13 +115,13 @@ impl ViewDepth {
     #[inline]
     fn beyond_near(&self, z: Unorm32) -> f64 {
         let d = fraction(z);
-        match self.lens {
+        match self.projection {
             // d = f (z − n) / (z (f − n)), solved for z − n so that nothing cancels.
-            Lens::Perspective => {
+            Projection::Perspective => {
                 let far = self.near + self.range;
                 d * self.range * self.near / (far * (1.0 - d) + self.near * d)
             }
-            Lens::Parallel => d * self.range,
+            Projection::Orthographic => d * self.range,
         }
     }
 }
@@ -85,9 +138,9 @@ mod tests {
 
     #[test]
     fn the_planes_stand_where_they_are_said_to() {
-        for lens in [Lens::Perspective, Lens::Parallel] {
+        for projection in [Projection::Perspective, Projection::Orthographic] {
             for (near, range) in [(0.1, 499.9), (1.0, 1.0), (1e6, 1e-3), (1e-3, 1e6)] {
-                let depth = ViewDepth::new(near, range, lens);
+                let depth = ViewDepth::new(near, range, projection);
                 assert_eq!(depth.at(Unorm32::NEAR), near);
                 assert!((depth.at(Unorm32::FAR) / (near + range) - 1.0).abs() < 1e-9);
                 assert_eq!(depth.log_warped(Unorm32::NEAR), -1.0);
@@ -99,7 +152,7 @@ mod tests {
     #[test]
     fn a_perspective_depth_by_hand() {
         // n = 1, f = 4: z = 2 has depth 4·1/(2·3) = 2/3, and lies at ln 2/ln 4 = 1/2.
-        let depth = ViewDepth::new(1.0, 3.0, Lens::Perspective);
+        let depth = ViewDepth::new(1.0, 3.0, Projection::Perspective);
         let z = Unorm32((f64::from(u32::MAX) * 2.0 / 3.0) as u32);
         assert!((depth.at(z) - 2.0).abs() < 1e-8);
         assert!(depth.log_warped(z).abs() < 1e-8);

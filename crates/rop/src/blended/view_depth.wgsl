@@ -2,16 +2,16 @@
 
 // ViewDepth::at.
 fn view_depth(z: u32) -> f32 {
-    return NEAR + beyond_near(z);
+    return VIEW_NEAR + beyond_near(z);
 }
 
 fn beyond_near(z: u32) -> f32 {
     let d = fraction(z);
-    if LENS_PARALLEL {
-        return d * RANGE;
+    if VIEW_PARALLEL {
+        return d * VIEW_RANGE;
     }
-    let far = NEAR + RANGE;
-    return d * RANGE * NEAR / (far * before_far(z) + NEAR * d);
+    let far = VIEW_NEAR + VIEW_RANGE;
+    return d * VIEW_RANGE * VIEW_NEAR / (far * before_far(z) + VIEW_NEAR * d);
 }
 
 // A stored depth as a fraction of the range.

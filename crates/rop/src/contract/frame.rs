@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::contract::primitive_depths::PrimitiveDepths;
 use screendoor_trace::error::Result;
 use screendoor_trace::tile::TileGrid;
-use screendoor_trace::trace::{ColourFormat, ColumnSet, Fragment, Trace, Unorm32};
+use screendoor_trace::trace::{ColourFormat, ColumnSet, Fragment, Trace, Unorm32, View};
 
 /// What a design knows of the frame it draws.
 #[derive(Clone, Debug)]
@@ -20,6 +20,8 @@ pub struct Frame {
     pub seed: u32,
     /// Bits that a stored colour takes.
     pub colour_bits: u32,
+    /// The view that the trace was taken in, where it says so.
+    pub view: Option<View>,
     /// Whether opaque fragments (alpha 1) may come. Where none do, nothing is kept for them.
     pub opaque: bool,
     /// The primitives' mean depths, for a design that asks for them.
@@ -47,6 +49,7 @@ impl Frame {
                 ColourFormat::F16 => 48,
                 ColourFormat::F32 => 96,
             },
+            view: header.view,
             opaque: true,
             primitive_depths: None,
             columns: ColumnSet::NONE,

@@ -4,6 +4,7 @@ use glam::{DMat4, DVec3, DVec4};
 
 use crate::scene::Scene;
 use screendoor_trace::error::{Error, Result};
+use screendoor_trace::trace::{Projection, View};
 
 /// From where and how wide to look. What is not given follows the scene's own
 /// view, framed so that all of it shows.
@@ -24,6 +25,10 @@ const FIELD_OF_VIEW: f64 = 35.0;
 const MARGIN: f64 = 0.03;
 /// The near plane is at least this share of the far plane's distance.
 const NEAREST: f64 = 1e-3;
+/// Parallel lines of sight begin nowhere. View space begins this many radii before the
+/// scene's centre where they are recorded, so that distances are those of a perspective
+/// camera about as far away, and above 0.
+const PARALLEL_RADII: f64 = 2.0;
 
 /// A camera over a frame.
 #[derive(Clone, Debug)]
@@ -39,6 +44,7 @@ pub struct Camera {
     pub(crate) eye: Option<DVec3>,
     /// Frame size in pixels.
     pub(crate) size: [f64; 2],
+    view: View,
     description: String,
 }
 
@@ -113,7 +119,10 @@ impl Camera {
         let slack = (1e-3 * radius).max(f64::MIN_POSITIVE);
         let (nearest, furthest) = (nearest + slack, furthest - slack);
 
-        let (to_clip, eye) = if fov == 0.0 {
+        // Scene space to the view space of a camera so far before the centre.
+        let from =
+            |distance: f64| DMat4::from_translation(DVec3::new(0.0, 0.0, -distance)) * to_view;
+        let (to_clip, eye, seen) = if fov == 0.0 {
             let [mut half_width, mut half_height] = view.frame.unwrap_or([0.0; 2]);
             if view.frame.is_none() {
                 for (point, around) in scene.bounding_points() {
@@ -125,13 +134,18 @@ impl Camera {
             // The frame's shape decides; what was asked for fits inside.
             let half_height = half_height.max(half_width / aspect).max(slack);
             let half_width = half_height * aspect;
-            let projection = DMat4::from_cols(
-                DVec4::new(1.0 / half_width, 0.0, 0.0, 0.0),
-                DVec4::new(0.0, 1.0 / half_height, 0.0, 0.0),
-                DVec4::new(0.0, 0.0, -1.0 / (nearest - furthest), 0.0),
-                DVec4::new(0.0, 0.0, nearest / (nearest - furthest), 1.0),
-            );
-            (projection * to_view, None)
+            let half = [half_width, half_height];
+            let projection = parallel(half, -nearest, -furthest);
+            let distance = PARALLEL_RADII * radius;
+            let (near, far) = (distance - nearest, distance - furthest);
+            let seen = View {
+                projection: Projection::Orthographic,
+                near,
+                far,
+                world_to_view: from(distance).to_cols_array(),
+                view_to_clip: parallel(half, near, far).to_cols_array(),
+            };
+            (projection * to_view, None, seen)
         } else {
             let tangent_y = libm::tan(fov.to_radians() / 2.0);
             let tangent_x = tangent_y * aspect;
@@ -167,7 +181,14 @@ impl Camera {
                 DVec4::new(0.0, 0.0, -far * near / (far - near), 0.0),
             );
             let retreat = DMat4::from_translation(DVec3::new(0.0, 0.0, -distance));
-            (projection * retreat * to_view, Some(centre + back * distance))
+            let seen = View {
+                projection: Projection::Perspective,
+                near,
+                far,
+                world_to_view: from(distance).to_cols_array(),
+                view_to_clip: projection.to_cols_array(),
+            };
+            (projection * retreat * to_view, Some(centre + back * distance), seen)
         };
         let lens = match (fov, options.distance) {
             (0.0, _) => "parallel lines".to_string(),
@@ -181,6 +202,7 @@ impl Camera {
             back,
             eye,
             size: [f64::from(width), f64::from(height)],
+            view: seen,
             description: format!("angle {yaw},{pitch}, {lens}"),
         })
     }
@@ -190,10 +212,27 @@ impl Camera {
         &self.description
     }
 
+    /// The camera in numbers, for a trace's header; `None` for a scene so small, large or
+    /// far away that double precision does not tell its planes and axes well enough.
+    pub fn view(&self) -> Option<View> {
+        self.view.check().is_ok().then_some(self.view)
+    }
+
     /// Unit vector from `point` towards the camera.
     pub(crate) fn towards(&self, point: DVec3) -> DVec3 {
         self.eye.map_or(self.back, |eye| (eye - point).normalize_or(self.back))
     }
+}
+
+/// The projection along parallel lines of the `half` width and height, with depth 0 at the
+/// distance `near` and 1 at `far`.
+fn parallel([half_width, half_height]: [f64; 2], near: f64, far: f64) -> DMat4 {
+    DMat4::from_cols(
+        DVec4::new(1.0 / half_width, 0.0, 0.0, 0.0),
+        DVec4::new(0.0, 1.0 / half_height, 0.0, 0.0),
+        DVec4::new(0.0, 0.0, -1.0 / (far - near), 0.0),
+        DVec4::new(0.0, 0.0, -near / (far - near), 1.0),
+    )
 }
 
 #[cfg(test)]
@@ -237,6 +276,44 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn what_is_recorded_is_what_is_drawn() {
+        for fov in [0.0, 10.0, 60.0, 120.0] {
+            for (angle, distance) in [([0.0, 0.0], None), ([30.0, 20.0], Some(3.0))] {
+                let options =
+                    CameraOptions { angle: Some(angle), field_of_view: Some(fov), distance };
+                let scene = cube();
+                let camera = Camera::frame(&scene, &options, 320, 100).unwrap();
+                let view = camera.view().unwrap();
+                let to_view = DMat4::from_cols_array(&view.world_to_view);
+                let to_clip = DMat4::from_cols_array(&view.view_to_clip) * to_view;
+                assert_eq!(view.projection == Projection::Orthographic, fov == 0.0);
+                for (point, _) in scene.bounding_points() {
+                    let distance = -to_view.transform_point3(point).z;
+                    assert!((view.near..view.far).contains(&distance), "{fov} {distance}");
+                    let [drawn, told] = [camera.to_clip, to_clip].map(|m| m.project_point3(point));
+                    assert!((drawn - told).length() < 1e-12, "{fov} {drawn} {told}");
+                }
+                // The eye, where there is one, is where distances begin.
+                let eye = camera.eye.map(|eye| to_view.transform_point3(eye).length());
+                assert!(eye.is_none_or(|off| off < 1e-12), "{fov} {eye:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_scene_beyond_double_precision_has_no_view_and_is_drawn() {
+        let mut scene = Scene::default();
+        let far = Mesh {
+            positions: vec![Vec3::splat(1e30), Vec3::splat(1e30), Vec3::splat(1e30)],
+            triangles: vec![[0, 1, 2]],
+            ..Mesh::default()
+        };
+        scene.add("far", Shape::Mesh(far));
+        let camera = Camera::frame(&scene, &CameraOptions::default(), 10, 10).unwrap();
+        assert!(camera.view().is_none_or(|view| view.check().is_ok()));
     }
 
     #[test]

@@ -125,6 +125,7 @@ impl<'a> Capture<'a> {
             colour: options.colour,
             source: scene.source.clone(),
             camera: camera.description().to_string(),
+            view: camera.view(),
             ..Header::default()
         };
         header.check()?;

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::study::file::Study;
 use crate::study::record::Record;
-use screendoor_trace::trace::Statistics;
+use screendoor_trace::trace::{Statistics, View};
 
 /// A study with what has been measured of it.
 #[derive(Clone, PartialEq, Debug)]
@@ -40,6 +40,9 @@ pub struct SceneFacts {
     pub source: String,
     /// The camera.
     pub camera: String,
+    /// The same in numbers, where the trace has them. They are no part of the content.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub view: Option<View>,
     /// What its file holds and is not drawn, a line for each kind.
     #[serde(default)]
     pub warnings: Vec<String>,
@@ -47,6 +50,15 @@ pub struct SceneFacts {
     pub pixel: [u16; 2],
     /// It in numbers.
     pub statistics: Statistics,
+}
+
+impl SceneFacts {
+    /// Whether a trace with this content and view is the one that was measured. What was
+    /// measured before traces had views had none that it could depend on.
+    pub fn are_of(&self, content: &str, view: Option<&View>) -> bool {
+        let views = self.view.as_ref().zip(view);
+        self.content == content && views.is_none_or(|(measured, found)| measured == found)
+    }
 }
 
 /// Where and with what a study was run.

@@ -53,8 +53,9 @@ macro_rules! columns {
 }
 
 /// Adds an optional column that no trace of the program's own has, so that what holds for
-/// optional columns can be tested while there is none.
-#[cfg(test)]
+/// optional columns can be tested while there is none: here, and with the feature `probe`
+/// by the tests of what reads columns.
+#[cfg(any(test, feature = "probe"))]
 macro_rules! with_probe {
     ($then:ident { $($required:tt)* } { $($optional:tt)* }) => {
         $then! {
@@ -66,7 +67,7 @@ macro_rules! with_probe {
         }
     };
 }
-#[cfg(not(test))]
+#[cfg(not(any(test, feature = "probe")))]
 macro_rules! with_probe {
     ($then:ident $($table:tt)*) => { $then! { $($table)* } };
 }

@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 
 use crate::trace::columns::ColumnId;
+use crate::trace::header::without_view;
 use crate::trace::seal::CHECKSUMS;
 
 /// Hashes a trace's content as its batches pass: BLAKE3 over the entries of the
-/// schema's metadata, as they are spelt in the file, and over the BLAKE3 of each
-/// stored column's little-endian bytes. The same fragments give the same hash in
+/// schema's metadata, as they are spelt in the file, but for those of its view, and over
+/// the BLAKE3 of each stored column's little-endian bytes. The same fragments give the same hash in
 /// batches of any size and under any compression.
 #[derive(Debug)]
 pub(crate) struct ContentHasher {
@@ -23,8 +24,9 @@ impl ContentHasher {
         columns: impl Iterator<Item = ColumnId>,
     ) -> Self {
         let mut entries = blake3::Hasher::new();
-        // Whether a file is sealed is not part of what it says.
-        for (key, value) in metadata.iter().filter(|(key, _)| *key != CHECKSUMS) {
+        // Whether a file is sealed is not part of what it says, nor is its view, which no
+        // fragment depends on.
+        for (key, value) in without_view(metadata).filter(|(key, _)| *key != CHECKSUMS) {
             entries.update(format!("{key}={value}\n").as_bytes());
         }
         let columns = columns.map(|id| (id, blake3::Hasher::new())).collect();

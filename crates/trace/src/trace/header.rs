@@ -8,10 +8,14 @@ use crate::error::{Error, Result};
 use crate::trace::column::{Scalar, ValueType};
 use crate::trace::columns::ColumnId;
 use crate::trace::fragment::MAX_SAMPLES;
+use crate::trace::metadata::MetadataReader;
+use crate::trace::view::View;
 
-/// The version of the format that this crate writes; it reads every version
-/// with the same major number.
-pub const FORMAT_VERSION: &str = "1.0";
+/// The newest version of the format that this crate writes, that of traces with a view; it
+/// reads every version with the same major number.
+pub const FORMAT_VERSION: &str = "1.1";
+/// The version of traces without a view, which are as they were before there was any.
+const WITHOUT_VIEW: &str = "1.0";
 
 /// The longest side of a frame, in pixels: coordinates are 16 bits.
 pub const MAX_SIDE: u32 = 1 << 16;
@@ -101,6 +105,8 @@ pub struct Header {
     pub source: String,
     /// From where it was seen, in words.
     pub camera: String,
+    /// The same in numbers, where they are known. No part of the content hash.
+    pub view: Option<View>,
     /// Columns that have one value in all rows; they have no column in the file.
     #[serde(skip)]
     pub constants: BTreeMap<ColumnId, Scalar>,
@@ -191,7 +197,12 @@ impl Header {
         if !self.background.iter().all(|c| c.is_finite()) {
             return Err(Error::config("the background is not finite", "give three finite numbers"));
         }
-        Ok(())
+        self.view.as_ref().map_or(Ok(()), View::check)
+    }
+
+    /// The version of the format that a file with this header has.
+    fn version(&self) -> &'static str {
+        if self.view.is_some() { FORMAT_VERSION } else { WITHOUT_VIEW }
     }
 
     /// The header as the metadata of the Arrow schema.
@@ -199,7 +210,7 @@ impl Header {
         let join = |items: Vec<String>| items.join(" ");
         let positions = self.pattern.positions.iter().map(|[x, y]| format!("{x},{y}")).collect();
         let mut map: BTreeMap<String, String> = [
-            (key::VERSION, FORMAT_VERSION.to_string()),
+            (key::VERSION, self.version().to_string()),
             (key::WIDTH, self.width.to_string()),
             (key::HEIGHT, self.height.to_string()),
             (key::SAMPLES, self.pattern.samples().to_string()),
@@ -212,6 +223,7 @@ impl Header {
             (key::CAMERA, self.camera.clone()),
         ]
         .into_iter()
+        .chain(self.view.into_iter().flat_map(View::to_metadata))
         .map(|(k, v)| (k.to_string(), v))
         .collect();
         for (column, value) in &self.constants {
@@ -278,6 +290,7 @@ impl Header {
             colour: ColourFormat::default(),
             source: reader.text(key::SOURCE)?.to_string(),
             camera: reader.text(key::CAMERA)?.to_string(),
+            view: View::from_metadata(&reader)?,
             optional: constants.keys().copied().filter(|id| id.is_optional()).collect(),
             constants,
         };
@@ -291,44 +304,16 @@ impl Header {
     }
 }
 
-struct MetadataReader<'a> {
-    map: &'a BTreeMap<String, String>,
-    place: &'a str,
-}
-
-impl MetadataReader<'_> {
-    fn text(&self, key: &str) -> Result<&str> {
-        self.map.get(key).map(String::as_str).ok_or_else(|| {
-            Error::invalid(
-                self.place,
-                format_args!("the metadata '{key}' is missing"),
-                "this is not a screendoor trace, or it was written without its schema metadata",
-            )
-        })
-    }
-
-    fn bad(&self, key: &str, wanted: &str) -> Error {
-        let text = self.map.get(key).map_or("", String::as_str);
-        Error::invalid(
-            format_args!("{}, metadata '{key}'", self.place),
-            format_args!("'{}' is not {wanted}", text.chars().take(40).collect::<String>()),
-            "correct the writer of the trace (docs/TRACE_FORMAT.md)",
-        )
-    }
-
-    fn parse<T: std::str::FromStr>(&self, key: &str, wanted: &str) -> Result<T> {
-        self.text(key)?.parse().map_err(|_| self.bad(key, wanted))
-    }
-
-    fn list<T>(
-        &self,
-        key: &str,
-        wanted: &str,
-        parse: impl Fn(&str) -> Option<T>,
-    ) -> Result<Vec<T>> {
-        let items = self.text(key)?.split_whitespace().map(parse).collect::<Option<Vec<_>>>();
-        items.ok_or_else(|| self.bad(key, wanted))
-    }
+/// The entries of a schema's metadata as they are where a trace has no view: a trace's
+/// content is the same with and without.
+pub(super) fn without_view(
+    metadata: &BTreeMap<String, String>,
+) -> impl Iterator<Item = (&str, &str)> {
+    let entries = metadata.iter().map(|(key, value)| (key.as_str(), value.as_str()));
+    entries.filter(|(key, _)| !View::has_key(key)).map(|(key, value)| match (key, value) {
+        (key::VERSION, FORMAT_VERSION) => (key, WITHOUT_VIEW),
+        entry => entry,
+    })
 }
 
 #[cfg(test)]

@@ -19,6 +19,7 @@ mod decompress;
 mod fragment;
 mod header;
 mod layout;
+mod metadata;
 #[cfg(test)]
 mod optional;
 mod other;
@@ -29,6 +30,7 @@ mod stored;
 mod stored_file;
 mod stream;
 mod ties;
+mod view;
 mod write;
 
 pub use batch::{Batch, MAX_BATCH_ROWS};
@@ -44,4 +46,5 @@ pub use stats::{
     AlphaStatistics, Distribution, Objects, Statistics, statistics, statistics_within,
 };
 pub use ties::{tied_fragments, tied_fragments_within};
+pub use view::{Projection, View};
 pub use write::{Compression, TraceWriter, WriteOptions, Written};

@@ -73,6 +73,7 @@ where
         background: [0.5; 3],
         seed: 3,
         colour_bits: 96,
+        view: None,
         opaque: true,
         primitive_depths: None,
         columns: Default::default(),

@@ -103,6 +103,7 @@ fn facts(name: &str, place: usize) -> SceneFacts {
         samples: 64,
         source: format!("builtin:{name}"),
         camera: "angle 0, 0; distance 3; field of view 45".into(),
+        view: None,
         warnings: Vec::new(),
         pixel: [256, 256],
         statistics,

@@ -12,8 +12,8 @@ use screendoor_trace::trace::Trace;
 
 /// Finds out what would keep the runs of a part from being done that are not in `folder` yet:
 /// scenes that are not there or have no such name or parameters, textures and traces that
-/// cannot be read, traces that do not serve the sample counts, and engines that this machine
-/// has not. Nothing is written.
+/// cannot be read, traces that do not serve the sample counts or have no view where a design
+/// asks for it, and engines that this machine has not. Nothing is written.
 ///
 /// # Errors
 /// The first that is found, with the scene or the engine that it is of.
@@ -38,10 +38,11 @@ pub fn check(
         return Ok(());
     }
     for (index, entry) in study.scenes.iter().enumerate() {
-        let samples: Vec<u32> =
-            pending.iter().filter(|job| job.scene == index).map(|job| job.samples).collect();
-        if !samples.is_empty() {
-            check_scene(entry, folder, base, &samples).map_err(|e| of(e, "scene", &entry.name))?;
+        let jobs: Vec<&Job> = pending.iter().copied().filter(|job| job.scene == index).collect();
+        if !jobs.is_empty() {
+            check_scene(entry, folder, base, &jobs)
+                .and_then(|()| check_view(study, entry, folder, base, &jobs))
+                .map_err(|e| of(e, "scene", &entry.name))?;
         }
     }
     for engine in &study.engines {
@@ -63,11 +64,40 @@ fn of(error: Error, kind: &str, name: &str) -> Error {
     }
 }
 
-fn check_scene(entry: &SceneEntry, folder: &Path, base: &Path, samples: &[u32]) -> Result<()> {
+/// Refuses designs that take view depths from a trace's view where there is a trace already
+/// and it has none; what has not been captured yet will have one.
+fn check_view(
+    study: &Study,
+    entry: &SceneEntry,
+    folder: &Path,
+    base: &Path,
+    jobs: &[&Job],
+) -> Result<()> {
+    let path = match &entry.trace {
+        Some(trace) => base.join(trace),
+        None => trace_path(folder, &entry.name),
+    };
+    let asks = |job: &&&Job| {
+        let design = study.design(&job.series, job.samples);
+        design.is_ok_and(|design| design.asks_for_view())
+    };
+    match jobs.iter().find(asks) {
+        Some(job) if path.exists() && Trace::open(&path)?.header().view.is_none() => {
+            Err(Error::config(
+                format_args!("{} does not say its view, for '{}'", path.display(), job.series),
+                "capture it again, let its writer state the view (docs/TRACE_FORMAT.md), or \
+                 leave the design out",
+            ))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn check_scene(entry: &SceneEntry, folder: &Path, base: &Path, jobs: &[&Job]) -> Result<()> {
     if let Some(trace) = &entry.trace {
         let trace = Trace::open(base.join(trace))?;
         let header = trace.header();
-        samples.iter().try_for_each(|count| header.pattern.prefix(*count).map(|_| ()))?;
+        jobs.iter().try_for_each(|job| header.pattern.prefix(job.samples).map(|_| ()))?;
         return match entry.pixel {
             Some([x, y]) if u32::from(x) >= header.width || u32::from(y) >= header.height => {
                 let (w, h) = (header.width, header.height);

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use crate::study::file::Study;
 use crate::study::record::Record;
+use crate::study::results::SceneFacts;
 use crate::study::run::store::Store;
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::output::{OutputFile, is_partial};
@@ -16,9 +17,9 @@ use screendoor_trace::output::{OutputFile, is_partial};
 pub struct Agreed<'a> {
     first: &'a Store,
     parts: &'a [Store],
-    /// The content of each scene's trace and the runs' records without times, with the folder
-    /// of the part that they are of.
-    scenes: BTreeMap<usize, (String, PathBuf)>,
+    /// What is known of each scene's trace and the runs' records without times, with the
+    /// folder of the part that they are of.
+    scenes: BTreeMap<usize, (SceneFacts, PathBuf)>,
     records: BTreeMap<String, (Record, PathBuf)>,
 }
 
@@ -73,7 +74,7 @@ impl Agreed<'_> {
         for scene in 0..self.study().scenes.len() {
             let Some(facts) = part.facts(scene)? else { continue };
             match self.scenes.get(&scene) {
-                Some((content, other)) if *content != facts.content => {
+                Some((known, other)) if !known.are_of(&facts.content, facts.view.as_ref()) => {
                     let (a, b) = (other.display(), part.folder().display());
                     return Err(Error::invalid(
                         part.scene_file(scene).display(),
@@ -83,7 +84,7 @@ impl Agreed<'_> {
                 }
                 Some(_) => {}
                 None => {
-                    self.scenes.insert(scene, (facts.content, part.folder().to_path_buf()));
+                    self.scenes.insert(scene, (facts, part.folder().to_path_buf()));
                 }
             }
         }

@@ -96,12 +96,13 @@ fn facts(
     watch: Watch<'_>,
 ) -> Result<SceneFacts> {
     let entry = &store.study().scenes[index];
+    let view = trace.header().view;
     let content = match trace.content() {
         Some(content) => content.to_string(),
         None => trace.verify(|_| ())?,
     };
     if let Some(facts) = store.facts(index)? {
-        if facts.content != content {
+        if !facts.are_of(&content, view.as_ref()) {
             return Err(Error::invalid(
                 trace.place(),
                 format_args!("scene '{}' was another one when the study was begun", entry.name),
@@ -120,6 +121,7 @@ fn facts(
         samples: header.pattern.samples(),
         source: header.source.clone(),
         camera: header.camera.clone(),
+        view,
         warnings: warnings()?,
         pixel: match entry.pixel {
             Some(pixel) => pixel,

@@ -312,7 +312,7 @@ impl Store {
         }
         let trace = Trace::open(&path)?;
         match trace.content() {
-            Some(content) if content == facts.content => Ok(()),
+            Some(content) if facts.are_of(content, trace.header().view.as_ref()) => Ok(()),
             _ => Err(Error::invalid(
                 path.display(),
                 format_args!("it is not the trace that scene '{}' was measured on", facts.name),
