@@ -205,6 +205,11 @@ mod tests {
     use screendoor_study::study::publications::{Effort, measure_publication};
 
     #[test]
+    fn the_document_of_the_tree_begins_with_what_is_said_of_all() {
+        assert!(include_str!("../../../../docs/RESULTS.md").starts_with(&results("", &[])));
+    }
+
+    #[test]
     fn every_claim_has_its_section_and_every_picture_is_there() {
         let effort = Effort { seeds: 2, side: 64, comparison_side: 32, ..Effort::brief() };
         let (mut named, quiet) = (Vec::new(), Quiet::new());
