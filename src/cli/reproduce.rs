@@ -13,7 +13,8 @@ use crate::cli::signals::on_interrupt;
 use crate::error::{Error, Result};
 use crate::output::OutputFile;
 use crate::param::Options;
-use crate::report::{Against, Document, PARTS, check_marks, document, in_short, results};
+use crate::report::document::Against;
+use crate::report::{Chapter, FIGURES_FOLDER, PARTS, chapter, check_marks, in_short, results};
 use crate::study::file::Publication;
 use crate::study::publications::experiment::Lab;
 use crate::study::publications::{Effort, measure_publication};
@@ -71,7 +72,7 @@ struct Written<'a> {
 #[derive(Serialize)]
 struct Part<'a> {
     name: &'a str,
-    against: &'a [Against],
+    against: Vec<&'a Against>,
 }
 
 /// Minutes on two processors that the parts take with the default effort, roughly: the tables
@@ -138,7 +139,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         return Err(Error::io("read", models, io::Error::new(io::ErrorKind::NotFound, why)));
     }
     check_output(&arguments.output, Kind::Folder)?;
-    let folder = arguments.output.join("figures");
+    let folder = arguments.output.join(FIGURES_FOLDER);
     std::fs::create_dir_all(&folder).map_err(|e| Error::io("create", &folder, e))?;
     let path = arguments.output.join("RESULTS.md");
     // The work takes long: that it can be written is found out before.
@@ -176,19 +177,19 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         progress.set(done, total);
     };
     let lab = Lab { folder: runs, models: arguments.models.as_deref(), watch: &watch };
-    let mut documents: Vec<(Publication, Document)> = Vec::new();
+    let mut chapters: Vec<(Publication, Chapter)> = Vec::new();
     let mut missing = Vec::new();
     for part in PARTS.into_iter().filter(|p| arguments.part.is_none_or(|only| only == *p)) {
         let measured = measure_publication(part, &lab, effort)?;
         missing.extend_from_slice(measured.missing());
-        documents.push((part, document(&measured, "figures")));
+        chapters.push((part, chapter(&measured)));
     }
     drop(progress);
     for missing in &missing {
         console.warn(&format!("{missing}: not in the models' folder; its table is left out"));
     }
-    let text = results(&before, &documents);
-    let figures: Vec<_> = documents.iter().flat_map(|(_, d)| &d.figures).collect();
+    let text = results(&before, &chapters);
+    let figures: Vec<_> = chapters.iter().flat_map(|(_, c)| &c.figures).collect();
     let save = || {
         for (name, drawn) in figures.iter().copied() {
             drawn.write(folder.join(drawn.file(name)))?;
@@ -210,12 +211,12 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         results: path.display().to_string(),
         figures: figures
             .iter()
-            .map(|(name, drawn)| format!("figures/{}", drawn.file(name)))
+            .map(|(name, drawn)| format!("{FIGURES_FOLDER}/{}", drawn.file(name)))
             .collect(),
         missing: &missing,
-        parts: documents
+        parts: chapters
             .iter()
-            .map(|(part, d)| Part { name: part.name(), against: &d.against })
+            .map(|(part, c)| Part { name: part.name(), against: c.against().collect() })
             .collect(),
     };
     report(json, "screendoor.reproduce", &written, console, || {

@@ -66,7 +66,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     drop(progress);
     if let Some(mut file) = output {
         let command = "cargo run --release -- stress -o docs/STABILITY.md";
-        file.write_bytes(stability(&found, command)?.as_bytes())?;
+        file.write_bytes(stability(&found, command)?.to_markdown(1, ".").as_bytes())?;
         file.commit()?;
     }
     report(json, "screendoor.stress", &found, console, || print(&found, arguments, console))?;

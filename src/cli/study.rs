@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::output::OutputFile;
 use crate::param::Options;
 use crate::report::html::{DesignText, answer};
-use crate::report::{About, PAGE, document, write_report};
+use crate::report::{About, PAGE, chapter, write_report};
 use crate::study::file::Study;
 use crate::study::publications::experiment::Lab;
 use crate::study::publications::{Effort, measure_publication};
@@ -160,13 +160,13 @@ fn publications(runner: &Runner<'_>) -> Result<Vec<(String, String)>> {
             Lab { folder: &store.publication_folder(*publication), models: None, watch: &told };
         match measure_publication(*publication, &lab, Effort::brief()) {
             Ok(reproduced) => {
-                let document = document(&reproduced, ".");
-                for (name, drawn) in &document.figures {
+                let chapter = chapter(&reproduced);
+                for (name, drawn) in &chapter.figures {
                     drawn.write(store.verification_file(&drawn.file(name)))?;
                 }
-                Store::put(&store.against_file(*publication), &document.against)?;
-                let path = store.document_file(*publication);
-                OutputFile::put(path, document.markdown.as_bytes())?;
+                let markdown = chapter.to_markdown(".");
+                OutputFile::put(store.markdown_file(*publication), markdown.as_bytes())?;
+                Store::put(&store.document_file(*publication), &chapter.sections)?;
                 lab.forget_traces();
             }
             Err(error) => failed.push((publication.name().to_string(), error.to_string())),

@@ -6,10 +6,10 @@ use std::time::SystemTime;
 use rayon::prelude::*;
 use serde_json::Value;
 
+use crate::document::{self, Against};
 use crate::export;
 use crate::html::viewer::{self, ViewedPicture, ViewedScene};
 use crate::html::{DesignText, Extras, Place, Section, page, replay_command, verification};
-use crate::results::Against;
 use screendoor_study::metrics::{Estimate, Flip, FlipMap};
 use screendoor_study::study::record::Record;
 use screendoor_study::study::results::{Results, SceneFacts};
@@ -62,17 +62,15 @@ fn publications(store: &Store) -> Result<Vec<Section>> {
     let mut sections = Vec::new();
     let mut missing = Vec::new();
     for publication in store.study().publications_to_measure() {
-        let path = store.document_file(publication);
-        if !path.exists() {
+        let Some(document) =
+            read_json::<Vec<document::Section>>(&store.document_file(publication))?
+        else {
             missing.push(publication.name());
             continue;
-        }
-        let text = std::fs::read_to_string(&path).map_err(|e| Error::io("read", &path, e))?;
+        };
         let figure = |name: &str| std::fs::read(store.verification_file(name)).ok();
-        sections.extend(verification::sections(&text, &figure));
-        against.extend(
-            read_json::<Vec<Against>>(&store.against_file(publication))?.unwrap_or_default(),
-        );
+        sections.extend(verification::sections(&document, &figure));
+        against.extend(document.iter().flat_map(document::Section::against).cloned());
     }
     if against.is_empty() && missing.is_empty() {
         return Ok(sections);

@@ -1,7 +1,7 @@
 //! Results as Markdown: for people, and for notes and issues.
 
+use crate::document::{Section, Text};
 use crate::html::words::{counted, figures, fixed};
-use crate::markdown_table;
 use screendoor_study::metrics::Estimate;
 use screendoor_study::study::record::Record;
 use screendoor_study::study::results::{Missing, Results};
@@ -12,36 +12,26 @@ const NONE: &str = "—";
 /// The study, a table for each scene and sample count, the machine, and what is missing.
 pub fn markdown(results: &Results) -> String {
     let study = &results.study;
-    let mut text = format!("# {}\n", escaped(&study.name));
-    paragraph(&mut text, &prose(study.description.trim()));
-    let how = format!(
+    let mut document = Section::new(Text::plain(&study.name));
+    let description = study.description.trim();
+    if !description.is_empty() {
+        document.paragraph(Text::plain(description));
+    }
+    document.paragraph(format!(
         "{} from {}, where a seed changes anything. Errors are over the covered pixels, against \
          the exact picture of the same samples, on linear values in units of 1/255, ± half of \
          the 95 % interval; the mean error is picture minus exact picture, with its sign. Everything but times is the same on every machine.",
         counted(study.seeds as usize, "seed"),
         study.first_seed
-    );
-    paragraph(&mut text, &how);
+    ));
     for scene in &study.scenes {
-        for samples in &study.samples {
-            let heading = format!("{}, {}", scene.name, counted(*samples as usize, "sample"));
-            paragraph(&mut text, &format!("## {}", escaped(&heading)));
-            paragraph(&mut text, &table(results, &scene.name, *samples));
-        }
+        document.parts.extend(study.samples.iter().map(|n| table(results, &scene.name, *n)));
     }
-    paragraph(&mut text, "## Machine");
+    let mut machine = Section::new("Machine");
     let facts = results.machine.facts();
-    let facts = facts.iter().map(|(name, value)| vec![escaped(name), escaped(value)]);
-    paragraph(&mut text, &markdown_table(&["", ""], &facts.collect::<Vec<_>>()));
-    paragraph(&mut text, "## Missing");
-    paragraph(&mut text, &missing(&results.missing));
-    text
-}
-
-fn paragraph(text: &mut String, paragraph: &str) {
-    if !paragraph.is_empty() {
-        text.push_str(&format!("\n{}\n", paragraph.trim_end()));
-    }
+    machine.table(["", ""], facts.iter().map(|(name, value)| [*name, value].map(Text::plain)));
+    document.parts.extend([machine, missing(&results.missing)]);
+    format!("{}\n", document.to_markdown(1, ".").trim_end())
 }
 
 /// A column's cell for a record; `None` where it has no figure.
@@ -62,28 +52,30 @@ const COLUMNS: &[(&str, Figure)] = &[
     ("comparators/fragment", |r| r.comparators_per_fragment().map(figures)),
 ];
 
-fn table(results: &Results, scene: &str, samples: u32) -> String {
+fn table(results: &Results, scene: &str, samples: u32) -> Section {
     let engines = results.engines();
-    let times: Vec<String> =
-        engines.iter().map(|e| escaped(&format!("{e}, ns/fragment"))).collect();
-    let mut header = vec!["design"];
-    header.extend(COLUMNS.iter().map(|(name, _)| name));
-    header.extend(times.iter().map(String::as_str));
-    let row = |series: &String| -> Vec<String> {
+    let times = engines.iter().map(|e| Text::plain(format!("{e}, ns/fragment")));
+    let names = COLUMNS.iter().map(|(name, _)| Text::plain(*name));
+    let header: Vec<Text> = std::iter::once("design".into()).chain(names).chain(times).collect();
+    let row = |series: &String| -> Vec<Text> {
         let Some(record) = results.record(scene, series, samples) else {
             let of = |m: &&Missing| m.scene == scene && m.series == *series && m.samples == samples;
             let why = results.missing.iter().find(of).map_or("not run yet", Missing::reason);
-            let mut cells = vec![escaped(&format!("{series} (missing: {why})"))];
+            let mut cells = vec![Text::plain(format!("{series} (missing: {why})"))];
             cells.resize(header.len(), NONE.into());
             return cells;
         };
         let time = |engine| Some(figures(record.nanoseconds_per_fragment(engine)?.median));
-        let mut cells = vec![Some(escaped(series))];
+        let mut cells = vec![Some(series.clone())];
         cells.extend(COLUMNS.iter().map(|(_, of)| of(record)));
         cells.extend(engines.iter().map(|e| time(e)));
-        cells.into_iter().map(|cell| cell.unwrap_or(NONE.into())).collect()
+        cells.into_iter().map(|cell| cell.map_or(NONE.into(), Text::plain)).collect()
     };
-    markdown_table(&header, &results.study.designs.iter().map(row).collect::<Vec<_>>())
+    let rows: Vec<_> = results.study.designs.iter().map(row).collect();
+    let title = format!("{scene}, {}", counted(samples as usize, "sample"));
+    let mut section = Section::new(Text::plain(title));
+    section.table(header, rows);
+    section
 }
 
 fn filtered(record: &Record, sigma: f64) -> Option<String> {
@@ -104,52 +96,18 @@ fn with_error(e: Estimate) -> Option<String> {
     Some(format!("{} ± {}", fixed(e.value, decimals), fixed(half, decimals)))
 }
 
-fn missing(list: &[Missing]) -> String {
+fn missing(list: &[Missing]) -> Section {
+    let mut section = Section::new("Missing");
     if list.is_empty() {
-        return "None: every run of the study has a result.".into();
+        section.paragraph("None: every run of the study has a result.");
+        return section;
     }
     let row = |m: &Missing| {
-        let [scene, series, why] = [&m.scene, &m.series, m.reason()].map(escaped);
-        vec![scene, series, m.samples.to_string(), why]
+        let samples = m.samples.to_string();
+        [m.scene.as_str(), &m.series, &samples, m.reason()].map(Text::plain)
     };
-    let rows: Vec<_> = list.iter().map(row).collect();
-    markdown_table(&["scene", "design", "samples", "why"], &rows)
-}
-
-/// A text that stays within its cell or heading, and is no markup.
-fn escaped(text: &str) -> String {
-    let mut safe = String::new();
-    for c in text.chars() {
-        match c {
-            '\n' | '\r' => safe.push(' '),
-            '|' | '<' | '&' | '\\' | '`' | '*' | '[' => {
-                safe.push_str(&format!("&#{};", u32::from(c)));
-            }
-            c => safe.push(c),
-        }
-    }
-    safe
-}
-
-/// A text of several sentences as one paragraph that is no markup.
-fn prose(text: &str) -> String {
-    let mut safe = String::new();
-    for c in escaped(text).chars() {
-        match c {
-            '_' | '~' | '$' | ']' | '>' => safe.push_str(&format!("&#{};", u32::from(c))),
-            c => safe.push(c),
-        }
-    }
-    // At a line's start other characters make headings, lists and lines.
-    let digits = safe.len() - safe.trim_start_matches(|c: char| c.is_ascii_digit()).len();
-    let at = if safe[digits..].starts_with(['.', ')']) { digits } else { 0 };
-    match safe[at..].chars().next() {
-        Some(c) if matches!(c, '#' | '+' | '-' | '=' | ':') || at > 0 => {
-            safe.replace_range(at..=at, &format!("&#{};", u32::from(c)));
-        }
-        _ => {}
-    }
-    safe
+    section.table(["scene", "design", "samples", "why"], list.iter().map(row));
+    section
 }
 
 #[cfg(test)]
@@ -157,43 +115,10 @@ mod tests {
     use super::*;
     use screendoor_study::study::analysis::made_up::plausible;
 
-    /// What a browser makes of a description, without its paragraph's tags.
-    fn shown(description: &str) -> String {
-        use pulldown_cmark::{Options, Parser};
-        let text = prose(description);
-        let mut page = String::new();
-        // All extensions but the one that makes other characters of dashes and quotes.
-        let options = Options::all() - Options::ENABLE_SMART_PUNCTUATION;
-        pulldown_cmark::html::push_html(&mut page, Parser::new_ext(&text, options));
-        page.trim().trim_start_matches("<p>").trim_end_matches("</p>").to_string()
-    }
-
-    #[test]
-    fn a_description_is_no_markup() {
-        for text in [
-            "Plain words, of a state-of-the-art study (8 bits).",
-            "# Not a heading",
-            "- no item",
-            "+ none",
-            "1. none",
-            "22) none",
-            "=== no underline",
-            "--- no rule",
-            "---",
-            "![picture](http://nowhere/a.png) and [link](x) and [^note]",
-            "a | b | c",
-            "*a* _b_ __c__ ~~d~~ `e` $f$ \\g",
-        ] {
-            assert_eq!(shown(text), text, "{text}");
-        }
-        assert_eq!(shown("one\n\n# two\r\n- three"), "one  # two  - three");
-        assert_eq!(shown("<script>x</script> &amp;"), "&lt;script&gt;x&lt;/script&gt; &amp;amp;");
-        assert_eq!(shown("> a"), "&gt; a");
-    }
-
     /// A table row's cells.
-    fn cells(line: &str) -> Vec<&str> {
-        line.trim_matches('|').split('|').map(str::trim).collect()
+    fn cells(line: &str) -> Vec<String> {
+        let line = line.replace("\\|", "");
+        line.trim_matches('|').split('|').map(|cell| cell.trim().to_string()).collect()
     }
 
     #[test]
@@ -211,7 +136,7 @@ mod tests {
                 assert_eq!(cells.len(), 1 + COLUMNS.len() + 2, "{line}");
                 match results.record(scene, series, samples) {
                     Some(r) => {
-                        assert_eq!(cells[0], series);
+                        assert_eq!(&cells[0], series);
                         assert_eq!(cells[1], with_error(r.covered.rmse).unwrap());
                         assert_eq!(cells[8], r.passes.to_string());
                     }
@@ -238,7 +163,7 @@ mod tests {
         }
         let text = markdown(&results);
         assert!(text.starts_with("# a # b\n"));
-        let lines = text.lines().filter(|l| l.contains("b&#92;&#124;  &#124; c")).count();
+        let lines = text.lines().filter(|l| l.contains("b&#92;\\|  \\| c")).count();
         assert_eq!(lines, 2 * results.missing.len());
         let per_row: Vec<usize> =
             text.lines().filter(|l| l.starts_with('|')).map(|l| cells(l).len()).collect();

@@ -6,8 +6,8 @@ mod against;
 mod choice;
 mod convergence;
 mod cost;
+mod document;
 mod error;
-mod markdown;
 pub mod packed;
 mod page;
 mod parts;
@@ -20,7 +20,7 @@ pub mod viewer;
 pub(crate) mod words;
 
 pub use choice::answer;
-pub use markdown::Figure;
+pub use document::Figure;
 pub use page::{DesignText, Extras, Place, Section, page};
 pub use parts::replay_command;
 pub use words::grouped;

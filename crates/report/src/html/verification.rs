@@ -1,12 +1,11 @@
 //! What publications print beside what is measured, as sections of the page: a table of
-//! all of it, and documents that were written as Markdown.
+//! all of it, and the documents' own sections.
 
 use maud::{Markup, html};
-use pulldown_cmark::{Event, HeadingLevel, Options, Parser, Tag, TagEnd, TextMergeStream};
 
-use crate::html::markdown::{Figure, inline, plain_text, rendered};
+use crate::document::{self, Against, Agreement};
+use crate::html::document::{Figure, body, text};
 use crate::html::page::{Place, Section};
-use crate::results::{Against, Agreement};
 
 /// The anchor of the table of all that publications print.
 const SUMMARY: &str = "publications";
@@ -62,88 +61,64 @@ fn row(a: &Against) -> Markup {
                 a href=(format!("#{}", anchor(&a.section))) { (a.section) }
                 span class="small" { (a.source) }
             }
-            td data-label="printed" { (inline(&a.printed)) }
-            td data-label="measured here" { (inline(&a.measured)) }
+            td data-label="printed" { (text(&a.printed.as_str().into())) }
+            td data-label="measured here" { (text(&a.measured.as_str().into())) }
             td data-label="verdict" { b class=(class) { (a.agreement.word()) } }
         }
     }
 }
 
-/// The sections of a Markdown document, split at its `##` headings; what stands before the
-/// first is left out. `figure` gives the bytes of a PNG by its file's name.
-pub fn sections(markdown: &str, figure: &Figure<'_>) -> Vec<Section> {
-    // Merged, so that a number and its interval in brackets are one text.
-    let parser = TextMergeStream::new(Parser::new_ext(markdown, Options::ENABLE_TABLES));
-    let events: Vec<Event<'_>> = parser.collect();
-    let second =
-        |e: &Event<'_>| matches!(e, Event::Start(Tag::Heading { level: HeadingLevel::H2, .. }));
-    let starts: Vec<usize> = (0..events.len()).filter(|i| second(&events[*i])).collect();
-    let ends = starts.iter().skip(1).copied().chain([events.len()]);
+/// A document's sections. `figure` gives the bytes of a picture or chart by its file's name.
+pub fn sections(document: &[document::Section], figure: &Figure<'_>) -> Vec<Section> {
     let mut list: Vec<Section> = Vec::new();
-    for (start, end) in starts.iter().copied().zip(ends) {
-        let part = &events[start..end];
-        let after = part.iter().position(|e| matches!(e, Event::End(TagEnd::Heading(_))));
-        let (heading, content) = part.split_at(after.map_or(part.len(), |i| i + 1));
-        let title = plain_text(heading);
+    for section in document {
+        let title = section.title.words();
         let base = anchor(&title);
         let taken = |name: &String| list.iter().any(|s| s.anchor == *name);
         let mut names = std::iter::once(base.clone()).chain((2..).map(|i| format!("{base}-{i}")));
         let anchor = names.find(|name| !taken(name)).unwrap_or(base);
-        let body = html! { div class="document" { (folded(content, figure)) } };
+        let body = html! { div class="document" { (body(section, figure)) } };
         list.push(Section { title, anchor, place: Place::Verification, body });
     }
     list
 }
 
-/// Parts under `###` of which a section may have so many before they are folded.
-const MOST_PARTS: usize = 3;
-
-/// A section's content; where it has many parts, each opens at a click.
-fn folded(content: &[Event<'_>], figure: &Figure<'_>) -> Markup {
-    let third =
-        |e: &Event<'_>| matches!(e, Event::Start(Tag::Heading { level: HeadingLevel::H3, .. }));
-    let starts: Vec<usize> = (0..content.len()).filter(|i| third(&content[*i])).collect();
-    if starts.len() <= MOST_PARTS {
-        return rendered(content, figure);
-    }
-    let ends = starts.iter().skip(1).copied().chain([content.len()]);
-    html! {
-        (rendered(&content[..starts[0]], figure))
-        @for (start, end) in starts.iter().copied().zip(ends) {
-            @let part = &content[start..end];
-            @let after = part.iter().position(|e| matches!(e, Event::End(TagEnd::Heading(_))));
-            @let (heading, rest) = part.split_at(after.map_or(part.len(), |i| i + 1));
-            details { summary { (plain_text(heading)) } (rendered(rest, figure)) }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::document::{Text, code};
     use screendoor_trace::picture::{Picture, write_png};
     use screendoor_trace::tile::TileGrid;
 
-    const DOCUMENT: &str = "lost\n\n## LK table 1\n\nRMSE of `lk`, see [it](https://example.org).\n\n\
-        | samples | lk | ratio | what |\n|---:|---:|---:|---|\n\
-        | 4 | 1.25 ± 0.01 | 0.9 [0.8, 1.0] | plain |\n\n\
-        ![The ramps](verification/there.png)\n\n*Above*: the ramps.\n\nAfter.\n\n\
-        ![Lost](gone.png)\n\n\
-        ## Enderton's examples\n\n### Deeper\n\n\
-        <script>alert(1)</script>\n\nA <b onclick=\"x()\">bold</b> [link](javascript:alert(2)) and\n\
-        ![\"><script>alert(3)</script>](there.png).\n\n## LK table 1\n";
-
+    /// Two sections of one name, and one whose words would be HTML.
     fn page_sections() -> Vec<Section> {
         let picture = Picture::new(TileGrid::new(3, 2), [0.5; 3]);
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("there.png");
         write_png(&path, &picture).unwrap();
         let png = std::fs::read(path).unwrap();
-        sections(DOCUMENT, &|name| (name == "there.png").then(|| png.clone()))
+        let mut first = document::Section::new("LK table 1");
+        first.paragraph("RMSE of `lk`, see [it](https://example.org).");
+        first.table(
+            ["samples", "lk", "ratio", "what"],
+            [["4", "1.25 ± 0.01", "0.9 [0.8, 1.0]", "plain"]],
+        );
+        first.figure("there.png".into(), "The ramps", "*Above*: the ramps.");
+        first.paragraph("After.");
+        first.figure("elsewhere/gone.png".into(), "Lost", "None.");
+        let mut second = document::Section::new("Enderton's examples");
+        let mut deeper = document::Section::new("Deeper");
+        deeper.paragraph("<script>alert(1)</script>");
+        deeper.paragraph("A <b onclick=\"x()\">bold</b> [link](javascript:alert(2)).");
+        deeper.figure("there.png".into(), "\"><script>alert(3)</script>", code("<script>`|"));
+        deeper.table(["<script>", "`a|b`"], [[Text::plain("<b x>|`"), Text::plain("*a*")]]);
+        second.parts.push(deeper);
+        let list = [first, second, document::Section::new("LK table 1")];
+        sections(&list, &|name| (name == "there.png").then(|| png.clone()))
     }
 
     #[test]
-    fn a_document_is_split_at_its_headings() {
+    fn every_section_has_an_anchor_of_its_own() {
         let list = page_sections();
         let names: Vec<_> = list.iter().map(|s| (s.anchor.as_str(), s.title.as_str())).collect();
         let expected = [
@@ -152,9 +127,8 @@ mod tests {
             ("lk-table-1-2", "LK table 1"),
         ];
         assert_eq!(names, expected);
-        assert!(list.iter().all(|s| s.place == Place::Verification && !s.body.0.contains("lost")));
+        assert!(list.iter().all(|s| s.place == Place::Verification));
         assert!(list[1].body.0.contains("<h3>Deeper</h3>"), "{}", list[1].body.0);
-        assert!(sections("no heading", &|_| None).is_empty());
     }
 
     #[test]
@@ -180,22 +154,30 @@ mod tests {
         assert!(figure.starts_with("<img src=\"data:image/png;base64,iVBORw0KGgo"), "{figure}");
         assert!(figure.contains("alt=\"The ramps\" width=\"3\" height=\"2\">"), "{figure}");
         assert!(figure.ends_with("<figcaption><em>Above</em>: the ramps.</figcaption>"));
-        assert!(after.contains("<p>After.</p>"), "{after}");
+        assert!(after.starts_with("<p>After.</p>"), "{after}");
         assert!(after.contains("Missing picture: gone.png"), "{after}");
         // What is no PNG is none.
-        let list = sections("## A\n\n![a](a.png)", &|_| Some(b"GIF89a".to_vec()));
+        let mut gif = document::Section::new("A");
+        gif.figure("a.png".into(), "a", "");
+        let list = sections(&[gif], &|_| Some(b"GIF89a".to_vec()));
         assert!(list[0].body.0.contains("Missing picture: a.png"));
     }
 
     #[test]
     fn many_parts_are_folded_and_few_are_not() {
         let parts = |n: usize| {
-            let list: String = (0..n).map(|i| format!("### Part {i}\n\nText {i}.\n\n")).collect();
-            sections(&format!("## A\n\nBefore.\n\n{list}"), &|_| None)[0].body.0.clone()
+            let mut section = document::Section::new("A");
+            section.paragraph("Before.");
+            for i in 0..n {
+                let mut part = document::Section::new(format!("Part `{i}`"));
+                part.paragraph(format!("Text {i}."));
+                section.parts.push(part);
+            }
+            sections(&[section], &|_| None)[0].body.0.clone()
         };
         assert!(!parts(3).contains("<details>"), "{}", parts(3));
         let folded = "<p>Before.</p><details><summary>Part 0</summary><p>Text 0.</p></details>";
-        let body = parts(4).replace('\n', "");
+        let body = parts(4);
         assert!(body.contains(folded) && body.matches("</details>").count() == 4, "{body}");
     }
 
@@ -205,7 +187,14 @@ mod tests {
         for tag in ["<script", "<b ", "javascript:", "href"] {
             assert!(!body.contains(tag), "{tag} is in {body}");
         }
-        for shown in ["&lt;script&gt;alert(1)&lt;/script&gt;", "&lt;b onclick", "<a>link</a>"] {
+        for shown in [
+            "<p>&lt;script&gt;alert(1)&lt;/script&gt;</p>",
+            "&lt;b onclick",
+            "<a>link</a>",
+            "<figcaption><code>&lt;script&gt;`|</code></figcaption>",
+            "<th scope=\"col\">&lt;script&gt;</th><th scope=\"col\"><code>a|b</code></th>",
+            "<td>&lt;b x&gt;|`</td><td>*a*</td>",
+        ] {
             assert!(body.contains(shown), "{shown} is not in {body}");
         }
     }

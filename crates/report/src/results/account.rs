@@ -1,19 +1,17 @@
 //! The account of where our LK table 1 differs from the paper's, and why.
 
-use std::fmt::Write;
-
-use crate::markdown_table;
-use crate::results::against::above;
+use crate::document::{Section, code};
 use crate::results::ratio;
-use crate::results::ratios::{Holding, OnScenes, holding};
+use crate::results::ratios::{Holding, OnScenes, above, holding};
 use crate::results::table_1::runs;
 use screendoor_study::metrics::Estimate;
 use screendoor_study::study::publications::{
-    Aspect, COUNTS, Order, Publications, Published, Variation,
+    Aspect, COUNTS, Order, Publications, Published, Table1, Variation,
 };
 
 /// The account; what was not measured is left out.
-pub(super) fn text(text: &mut String, p: &Publications) {
+pub(super) fn part(p: &Publications) -> Section {
+    let mut part = Section::new("Where this differs from the paper, and why");
     let published: Vec<String> = [Published::Motor, Published::Cloth]
         .iter()
         .map(|column| {
@@ -22,85 +20,64 @@ pub(super) fn text(text: &mut String, p: &Publications) {
             format!("{:.1} and {:.1}", fall(0), fall(1))
         })
         .collect();
-    let _ = writeln!(
-        text,
-        "### Where this differs from the paper, and why\n\n\
-         1. **How the error falls.** From 4 to 64 samples the paper's error falls by {} (LK and \
-         its comparison, MOTOR), {} (CLOTH). Ours:\n",
-        published[0], published[1]
+    part.numbered(
+        1,
+        [format!(
+            "**How the error falls.** From 4 to 64 samples the paper's error falls by {} (LK and \
+             its comparison, MOTOR), {} (CLOTH). Ours:",
+            published[0], published[1]
+        )],
     );
-    let rows: Vec<Vec<String>> =
-        p.table_1
-            .iter()
-            .map(|table| {
-                let (few, many) = (runs(table, 4), runs(table, 64));
-                let mut row = vec![table.scene.name.to_string()];
-                row.extend((0..3).map(|i| {
-                    format!("{:.1}", few[i].covered.rmse.value / many[i].covered.rmse.value)
-                }));
-                row
-            })
-            .collect();
-    text.push_str(&markdown_table(&["error at 4 ÷ at 64", "lk", "enderton", "naive"], &rows));
-    let _ = writeln!(
-        text,
-        "\n2. **Whether the paper's comparison method stratifies.** N^−½, without stratification, \
-         falls by {:.1} from 4 to 64 samples. `enderton` as the paper describes it (depth test \
-         first, then ⌊αn+ξ⌋ of the n survivors) stratifies whole fragments. \
-         The largest difference between the published ratio and ours over all counts:\n",
-        f64::from(COUNTS[COUNTS.len() - 1] / COUNTS[0]).sqrt()
+    let falls = |table: &Table1| {
+        let (few, many) = (runs(table, 4), runs(table, 64));
+        let fall = |i: usize| few[i].covered.rmse.value / many[i].covered.rmse.value;
+        let mut row = vec![table.scene.name.to_string()];
+        row.extend((0..3).map(|i| format!("{:.1}", fall(i))));
+        row
+    };
+    part.table(["error at 4 ÷ at 64", "lk", "enderton", "naive"], p.table_1.iter().map(falls));
+    part.numbered(
+        2,
+        [format!(
+            "**Whether the paper's comparison method stratifies.** N^−½, without stratification, \
+             falls by {:.1} from 4 to 64 samples. `enderton` as the paper describes it (depth test \
+             first, then ⌊αn+ξ⌋ of the n survivors) stratifies whole fragments. \
+             The largest difference between the published ratio and ours over all counts:",
+            f64::from(COUNTS[COUNTS.len() - 1] / COUNTS[0]).sqrt()
+        )],
     );
     let mut nearer = Vec::new();
-    let rows: Vec<Vec<String>> = p
-        .table_1
-        .iter()
-        .map(|table| {
-            let mut worst = [0.0_f64; 2];
-            for (n, [a, b]) in COUNTS.iter().zip(table.stands_for.rmse()) {
-                let [lk, e, naive] = runs(table, *n).map(|r| r.fine.value);
-                for (worst, other) in worst.iter_mut().zip([e, naive]) {
-                    *worst = worst.max((lk / other - a / b).abs());
-                }
+    let rows = p.table_1.iter().map(|table| {
+        let mut worst = [0.0_f64; 2];
+        for (n, [a, b]) in COUNTS.iter().zip(table.stands_for.rmse()) {
+            let [lk, e, naive] = runs(table, *n).map(|r| r.fine.value);
+            for (worst, other) in worst.iter_mut().zip([e, naive]) {
+                *worst = worst.max((lk / other - a / b).abs());
             }
-            nearer.push((table.scene.name.as_str(), worst[1] < worst[0]));
-            vec![
-                table.scene.name.to_string(),
-                format!("{:.2}", worst[0]),
-                format!("{:.2}", worst[1]),
-            ]
-        })
-        .collect();
-    let nearer = holding(nearer.into_iter());
-    text.push_str(&markdown_table(&["scene", "lk ÷ enderton", "lk ÷ naive"], &rows));
-    let _ = writeln!(
-        text,
-        "\nThe published ratios lie nearer to `lk ÷ naive` than to `lk ÷ enderton` {}.\n",
-        nearer.words()
-    );
+        }
+        nearer.push((table.scene.name.as_str(), worst[1] < worst[0]));
+        [table.scene.name.to_string(), format!("{:.2}", worst[0]), format!("{:.2}", worst[1])]
+    });
+    part.table(["scene", "lk ÷ enderton", "lk ÷ naive"], rows);
+    part.paragraph(format!(
+        "The published ratios lie nearer to `lk ÷ naive` than to `lk ÷ enderton` {}.",
+        holding(nearer.into_iter()).words()
+    ));
     if !p.variations.is_empty() {
-        views(text, p);
+        views(&mut part, p);
     }
+    part
 }
 
 /// How edges, order, view and background change the ratio.
-fn views(text: &mut String, p: &Publications) {
+fn views(part: &mut Section, p: &Publications) {
     let (seen, side) = (&p.variations, p.effort.comparison_side);
     let order = |order| in_order(seen, order).words();
-    let _ = writeln!(
-        text,
-        "3. **Edges.** Of a fragment that covers one sample or two `enderton` stratifies nothing; LK \
+    let edges = format!(
+        "**Edges.** Of a fragment that covers one sample or two `enderton` stratifies nothing; LK \
          stratifies over the surface. In smaller frames triangles stay and pixels grow. \
          `enderton` ÷ `naive` at {SAMPLES} samples is {} in frames of {} × {} pixels and {} in those \
-         of {} × {}; it is greater in the smaller frame {}.\n\
-         4. **Order.** LK's tracking counts on a surface's fragments coming one after the other. \
-         `lk` ÷ `enderton` at {SAMPLES} samples, {side} × {side} pixels: with the triangles near to \
-         far {}; far to near {}; in random order {}; in the scenes' own {}. The paper's CLOTH is \
-         in random order; its MOTOR's order is not stated.\n\
-         5. **View and background.** From other angles and before white `lk` ÷ `enderton` changes \
-         by {} at {side} × {side} pixels. Shading here is diffuse with a key and a fill light; the \
-         paper does not describe its lights.\n\n\
-         At {SAMPLES} samples, against the exact picture of the same samples, {} seeds ([?]: too few \
-         seeds for an interval):\n",
+         of {} × {}; it is greater in the smaller frame {}.",
         sized(seen, 2 * side, enderton_to_naive).range(),
         2 * side,
         2 * side,
@@ -108,31 +85,43 @@ fn views(text: &mut String, p: &Publications) {
         side / 2,
         side / 2,
         more_in_small_frames(seen, side).words(),
+    );
+    let orders = format!(
+        "**Order.** LK's tracking counts on a surface's fragments coming one after the other. \
+         `lk` ÷ `enderton` at {SAMPLES} samples, {side} × {side} pixels: with the triangles near to \
+         far {}; far to near {}; in random order {}; in the scenes' own {}. The paper's CLOTH is \
+         in random order; its MOTOR's order is not stated.",
         order(Order::NearToFar),
         order(Order::FarToNear),
         order(Order::Random),
         order(Order::Api),
-        change_of_view(seen),
-        p.effort.seeds
     );
-    let rows: Vec<Vec<String>> = p
-        .variations
-        .iter()
-        .map(|v| {
-            let [lk, e, naive] = v.rmse;
-            vec![
-                v.scene.clone(),
-                v.what.clone(),
-                format!("{:.1}", v.fragments_per_pixel),
-                format!("{:.0} %", 100.0 * v.edge_share),
-                format!("{:.2}", lk.value),
-                format!("{:.2}", e.value),
-                format!("{:.2}", naive.value),
-                ratio(lk, e),
-                ratio(lk, naive),
-            ]
-        })
-        .collect();
+    let views = format!(
+        "**View and background.** From other angles and before white `lk` ÷ `enderton` changes \
+         by {} at {side} × {side} pixels. Shading here is diffuse with a key and a fill light; the \
+         paper does not describe its lights.",
+        change_of_view(seen),
+    );
+    part.numbered(3, [edges, orders, views]);
+    part.paragraph(format!(
+        "At {SAMPLES} samples, against the exact picture of the same samples, {} seeds ([?]: too few \
+         seeds for an interval):",
+        p.effort.seeds
+    ));
+    let row = |v: &Variation| {
+        let [lk, e, naive] = v.rmse;
+        [
+            v.scene.clone(),
+            v.what.clone(),
+            format!("{:.1}", v.fragments_per_pixel),
+            format!("{:.0} %", 100.0 * v.edge_share),
+            format!("{:.2}", lk.value),
+            format!("{:.2}", e.value),
+            format!("{:.2}", naive.value),
+            ratio(lk, e),
+            ratio(lk, naive),
+        ]
+    };
     let header = [
         "scene",
         "seen",
@@ -144,8 +133,7 @@ fn views(text: &mut String, p: &Publications) {
         "lk ÷ enderton",
         "lk ÷ naive",
     ];
-    text.push_str(&markdown_table(&header, &rows));
-    text.push('\n');
+    part.table(header, seen.iter().map(row));
 }
 
 /// Samples of the variations.
@@ -225,7 +213,7 @@ fn change_of_view(seen: &[Variation]) -> String {
     });
     let most = changes.max_by(|a, b| a.0.total_cmp(&b.0));
     most.map_or("an amount that was not measured".to_string(), |(change, v)| {
-        format!("{:.0} % at most (`{}`, {})", 100.0 * change, v.scene, v.what)
+        format!("{:.0} % at most ({}, {})", 100.0 * change, code(&v.scene), v.what)
     })
 }
 

@@ -1,17 +1,15 @@
 //! What Enderton et al. and LK say of variants of their samples, on every scene: a table of
 //! masks, dithered numbers of samples, rounds stratified together, rounds of hashing.
 
-use std::fmt::Write;
-
-use crate::markdown_table;
-use crate::results::against::{Against, Agreement, above, below};
-use crate::results::ratios::{Holding, OnScenes, holding};
+use crate::document::{Against, Agreement, Section};
+use crate::results::ratios::{Holding, OnScenes, above, below, holding};
 use crate::results::{plain, ratio};
 use screendoor_study::metrics::{Estimate, student_t};
 use screendoor_study::study::measure::BLOCK;
 use screendoor_study::study::publications::claims::{
-    Claims, DITHERED, HASH_ROUNDS, STRATIFIED, TABLE, Trial,
+    DITHERED, HASH_ROUNDS, STRATIFIED, TABLE, Trial,
 };
+use screendoor_study::study::publications::methods::Methods;
 use screendoor_study::study::record::Record;
 
 /// Ratios of RMSE nearer to 1 than this are called the same.
@@ -90,34 +88,6 @@ fn rows(trial: &Trial, designs: &[&str], pairs: &[(Of, [&str; 2])]) -> Vec<Vec<S
         .collect()
 }
 
-fn write_table(text: &mut String, header: &[String], rows: &[Vec<String>]) {
-    let header: Vec<&str> = header.iter().map(String::as_str).collect();
-    text.push_str(&markdown_table(&header, rows));
-    text.push('\n');
-}
-
-/// The sections' claims, in their order.
-pub(super) fn against(claims: &Claims) -> Vec<Against> {
-    vec![
-        table_of_masks([&claims.variants, &claims.masks]),
-        dithered(&claims.variants),
-        rounds_together(&claims.rounds),
-        rounds_of_hashing(&claims.variants),
-    ]
-}
-
-/// The sections.
-pub(super) fn text(text: &mut String, claims: &Claims) {
-    table_of_masks([&claims.variants, &claims.masks]).open(text);
-    table_text(text, [&claims.variants, &claims.masks]);
-    dithered(&claims.variants).open(text);
-    dithered_text(text, &claims.variants);
-    rounds_together(&claims.rounds).open(text);
-    rounds_text(text, &claims.rounds);
-    rounds_of_hashing(&claims.variants).open(text);
-    hashing_text(text, &claims.variants);
-}
-
 /// Enderton's table of masks beside masks that are computed.
 fn table_of_masks([antialiased, centred_samples]: [&Trial; 2]) -> Against {
     let [computed, table, larger, survivors] = TABLE;
@@ -175,14 +145,16 @@ fn cause(with: &OnScenes, without: &OnScenes, against_larger: &OnScenes) -> &'st
     }
 }
 
-fn table_text(text: &mut String, [antialiased, centred_samples]: [&Trial; 2]) {
+/// The section on a table of masks.
+pub(super) fn masks_section(m: &Methods) -> Option<Section> {
+    let [antialiased, centred_samples] = [&m.claims.variants, &m.claims.masks];
     let [computed, table, ..] = TABLE;
-    let _ = writeln!(
-        text,
+    let mut section = Section::answering(table_of_masks([antialiased, centred_samples]));
+    section.paragraph(format!(
         "RMSE over the covered pixels; {}, and the same without antialiasing, where every fragment \
-         covers all samples of its pixels.\n",
+         covers all samples of its pixels.",
         frames(antialiased)
-    );
+    ));
     let pair = [(RMSE, [table, computed])];
     let mut list = rows(antialiased, &TABLE, &pair);
     for (row, whole) in list.iter_mut().zip(rows(centred_samples, &[], &pair)) {
@@ -191,7 +163,8 @@ fn table_text(text: &mut String, [antialiased, centred_samples]: [&Trial; 2]) {
     let mut header = vec!["scene".to_string()];
     header.extend(TABLE.map(|d| format!("`{d}`")));
     header.extend(["table ÷ computed".to_string(), "… without antialiasing".to_string()]);
-    write_table(text, &header, &list);
+    section.table(header, list);
+    Some(section)
 }
 
 /// Dithered numbers of samples.
@@ -226,20 +199,23 @@ fn dithered(trial: &Trial) -> Against {
     }
 }
 
-fn dithered_text(text: &mut String, trial: &Trial) {
+/// The section on that.
+pub(super) fn dither_section(m: &Methods) -> Option<Section> {
+    let trial = &m.claims.variants;
     let [white, dithers @ ..] = DITHERED;
-    let _ = writeln!(
-        text,
+    let mut section = Section::answering(dithered(trial));
+    section.paragraph(format!(
         "RMSE over the covered pixels, and the ratio of what is left over blocks; {}. The gain is \
-         smaller the more layers hide each other, since each has its own dither.\n",
+         smaller the more layers hide each other, since each has its own dither.",
         frames(trial)
-    );
+    ));
     let pairs = dithers.map(|d| (BLOCKS, [d, white]));
     let mut header = vec!["scene".to_string()];
     header.extend(DITHERED.map(|d| format!("`{d}`")));
     let name = |d: &str| format!("{}, blocks", d.rsplit('=').next().unwrap_or(d));
     header.extend(dithers.map(name));
-    write_table(text, &header, &rows(trial, &DITHERED, &pairs));
+    section.table(header, rows(trial, &DITHERED, &pairs));
+    Some(section)
 }
 
 /// Rounds that are stratified together.
@@ -282,9 +258,11 @@ fn rounds_together(trial: &Trial) -> Against {
     }
 }
 
-fn rounds_text(text: &mut String, trial: &Trial) {
-    let _ = writeln!(
-        text,
+/// The section on that.
+pub(super) fn rounds_section(m: &Methods) -> Option<Section> {
+    let trial = &m.claims.rounds;
+    let mut section = Section::answering(rounds_together(trial));
+    section.paragraph(format!(
         "RMSE over the covered pixels of the mean of 8 rounds; {} in each round. \
          `enderton:among=covered` takes its samples over all rounds from one mask. `enderton` \
          chooses among the samples that pass the depth test, which differ from round to round: \
@@ -292,9 +270,9 @@ fn rounds_text(text: &mut String, trial: &Trial) {
          every round leaves the same n samples writes ⌊8αn⌋ or ⌈8αn⌉ in all; so do those of a \
          surface of `systematic`. `lk` numbers the samples of all rounds one after the other in its \
          sequence. Where rounds differ in their surfaces, as chance decides, these are not \
-         stratified together.\n",
+         stratified together.",
         frames(trial)
-    );
+    ));
     let designs: Vec<&str> = STRATIFIED.into_iter().flatten().collect();
     let pairs = STRATIFIED.map(|[apart, together]| (RMSE, [together, apart]));
     let mut header = vec!["scene".to_string()];
@@ -303,7 +281,8 @@ fn rounds_text(text: &mut String, trial: &Trial) {
         header.extend(["apart", "together"].map(|how| format!("`{}`, {how}", short(apart))));
     }
     header.extend(STRATIFIED.map(|[apart, _]| format!("`{}`, together ÷ apart", short(apart))));
-    write_table(text, &header, &rows(trial, &designs, &pairs));
+    section.table(header, rows(trial, &designs, &pairs));
+    Some(section)
 }
 
 /// Whether a hash of fewer rounds gives what all four give, on every scene: no mean error
@@ -358,20 +337,22 @@ fn rounds_of_hashing(trial: &Trial) -> Against {
     }
 }
 
-fn hashing_text(text: &mut String, trial: &Trial) {
-    let _ = writeln!(
-        text,
+/// The section on that.
+pub(super) fn hashing_section(m: &Methods) -> Option<Section> {
+    let trial = &m.claims.variants;
+    let mut section = Section::answering(rounds_of_hashing(trial));
+    section.paragraph(format!(
         "`lk:track=covered`, which has no other bias; {}: RMSE over the covered pixels, its ratio \
-         to that of all four rounds, the ratio over blocks, and mean error.\n",
+         to that of all four rounds, the ratio over blocks, and mean error.",
         frames(trial)
-    );
+    ));
     let [.., all] = HASH_ROUNDS;
     let mut list = Vec::new();
     for scene in &trial.scenes {
         for (rounds, design) in (1..).zip(HASH_ROUNDS) {
             let Some((own, four)) = scene.variant(design).zip(scene.variant(all)) else { continue };
             let mean = own.covered.mean;
-            list.push(vec![
+            list.push([
                 scene.name.clone(),
                 format!("{rounds}"),
                 plain(own.covered.rmse),
@@ -382,8 +363,8 @@ fn hashing_text(text: &mut String, trial: &Trial) {
         }
     }
     let header = ["scene", "rounds", "RMSE", "÷ four", "÷ four, blocks", "mean error"];
-    text.push_str(&markdown_table(&header, &list));
-    text.push('\n');
+    section.table(header, list);
+    Some(section)
 }
 
 #[cfg(test)]

@@ -1,11 +1,7 @@
 //! The results' part on all designs over the same fragments.
 
-use std::fmt::Write;
-
-use crate::markdown_table;
-use crate::results::against::below;
-use crate::results::ratios::OnScenes;
-use crate::results::slab;
+use crate::document::{Section, Text, code};
+use crate::results::ratios::{OnScenes, below};
 use screendoor_study::study::comparison::{Comparison, Contender, Duel};
 use screendoor_study::study::publications::experiment::MeasuredScene;
 use screendoor_study::study::record::Record;
@@ -15,25 +11,18 @@ const SHOWN: [u32; 3] = [4, 8, 16];
 /// Budgets of state in bytes per pixel of the table of winners.
 const BUDGETS: [f64; 5] = [48.0, 96.0, 192.0, 384.0, 768.0];
 
-/// The text of the part.
-pub(super) fn text(c: &Comparison, folder: &str) -> String {
-    let mut text = String::new();
-    preamble(&mut text, c);
-    for count in SHOWN {
-        table(&mut text, c, count);
-    }
-    methods(&mut text, c);
-    winners(&mut text, c);
-    duels(&mut text, c);
-    text.push_str(&slab::text(c, folder));
-    text
+/// The section.
+pub(super) fn section(c: &Comparison) -> Section {
+    let mut section = Section::new("All designs over the same fragments");
+    preamble(&mut section, c);
+    section.parts.extend(SHOWN.map(|count| table(c, count)));
+    section.parts.extend([methods(c), winners(c), duels(c)]);
+    section
 }
 
-fn preamble(text: &mut String, c: &Comparison) {
-    let _ = writeln!(
-        text,
-        "## All designs over the same fragments\n\n\
-         Every design of the registry with its defaults, and with each of its methods, at n \
+fn preamble(section: &mut Section, c: &Comparison) {
+    section.paragraph(format!(
+        "Every design of the registry with its defaults, and with each of its methods, at n \
          samples per pixel and, where it keeps layers, n layers (`slab`: 2n coverage bits, as in \
          Wyman's figure 1); {} × {} pixels, {} seeds of what is random. RMSE over the covered \
          pixels against the exact picture of the same samples, in 8-bit units, and in brackets the \
@@ -42,27 +31,23 @@ fn preamble(text: &mut String, c: &Comparison) {
          a bias; errors of both signs cancel in the mean. *At equal depths*: the share of the \
          fragments that meet another one of their depth at a sample, where promises for differing \
          depths are not kept. *State*: bytes per pixel in hardware, without a z-buffer for opaque geometry \
-         where the scene has none. *Passes* over the trace.\n",
+         where the scene has none. *Passes* over the trace.",
         c.side, c.side, c.seeds
-    );
-    let rows: Vec<Vec<String>> = c
-        .scenes
-        .iter()
-        .map(|s| {
-            let t = &s.statistics;
-            let percent = |n: u64| format!("{:.0} %", 100.0 * n as f64 / t.fragments.max(1) as f64);
-            vec![
-                s.name.to_string(),
-                format!("{:.2} M", t.fragments as f64 / 1e6),
-                format!("{:.1}", t.depth_complexity.mean),
-                t.depth_complexity.p95.to_string(),
-                t.depth_complexity.max.to_string(),
-                format!("{:.2}", t.alpha.mean),
-                percent(t.alpha.opaque),
-                percent(t.tied_fragments),
-            ]
-        })
-        .collect();
+    ));
+    let row = |s: &MeasuredScene| {
+        let t = &s.statistics;
+        let percent = |n: u64| format!("{:.0} %", 100.0 * n as f64 / t.fragments.max(1) as f64);
+        [
+            s.name.to_string(),
+            format!("{:.2} M", t.fragments as f64 / 1e6),
+            format!("{:.1}", t.depth_complexity.mean),
+            t.depth_complexity.p95.to_string(),
+            t.depth_complexity.max.to_string(),
+            format!("{:.2}", t.alpha.mean),
+            percent(t.alpha.opaque),
+            percent(t.tied_fragments),
+        ]
+    };
     let header = [
         "scene",
         "fragments",
@@ -73,11 +58,10 @@ fn preamble(text: &mut String, c: &Comparison) {
         "opaque",
         "at equal depths",
     ];
-    text.push_str(&markdown_table(&header, &rows));
+    section.table(header, c.scenes.iter().map(row));
     for missing in &c.missing {
-        let _ = writeln!(text, "\n`{missing}` was not given and is left out.");
+        section.paragraph(format!("{} was not given and is left out.", code(missing)));
     }
-    text.push('\n');
 }
 
 fn bytes(r: &Record) -> String {
@@ -97,30 +81,22 @@ fn range(values: impl Iterator<Item = String>) -> String {
     }
 }
 
-fn table(text: &mut String, c: &Comparison, count: u32) {
-    let _ = writeln!(text, "### {count} samples or layers\n");
-    let mut header = vec!["design", "state", "passes"];
-    header.extend(c.scenes.iter().map(|s| s.name.as_str()));
-    let rows: Vec<Vec<String>> = c
-        .contenders
-        .iter()
-        .map(|contender| {
-            let results = || c.scenes.iter().filter_map(|s| s.record(&contender.series, count));
-            let mut row = vec![
-                format!("`{}`", contender.label),
-                range(results().map(bytes)),
-                range(results().map(|r| r.passes.to_string())),
-            ];
-            row.extend(
-                c.scenes
-                    .iter()
-                    .map(|s| s.record(&contender.series, count).map_or("—".into(), cell)),
-            );
-            row
-        })
-        .collect();
-    text.push_str(&markdown_table(&header, &rows));
-    text.push('\n');
+fn table(c: &Comparison, count: u32) -> Section {
+    let mut part = Section::new(format!("{count} samples or layers"));
+    let rows = c.contenders.iter().map(|contender| {
+        let records: Vec<_> = c.scenes.iter().map(|s| s.record(&contender.series, count)).collect();
+        let there = || records.iter().copied().flatten();
+        let mut row = vec![
+            format!("`{}`", contender.label),
+            range(there().map(bytes)),
+            range(there().map(|r| r.passes.to_string())),
+        ];
+        row.extend(records.iter().map(|r| r.map_or("—".into(), cell)));
+        row
+    });
+    let scenes = c.scenes.iter().map(|s| s.name.as_str());
+    part.table(["design", "state", "passes"].into_iter().chain(scenes), rows);
+    part
 }
 
 fn cell(r: &Record) -> String {
@@ -155,7 +131,7 @@ fn pairs(c: &Comparison) -> Vec<(String, &Contender, &Contender)> {
 const SUMMED_UP: u32 = 8;
 
 /// What LK's and systematic samples gain, in a sentence a design.
-pub(super) fn in_short(c: &Comparison) -> Vec<String> {
+pub(super) fn in_short(c: &Comparison) -> Vec<Text> {
     let gains = |design: &str| {
         let own = |name: &str| name.split(':').next() == Some(design);
         let of = pairs(c).into_iter().filter(|(name, ..)| own(name)).map(|(name, a, b)| {
@@ -180,20 +156,19 @@ pub(super) fn in_short(c: &Comparison) -> Vec<String> {
             gains(design)
         )
     };
-    ["lk", "systematic"].map(line).to_vec()
+    ["lk", "systematic"].map(|design| line(design).into()).to_vec()
 }
 
 /// What LK's and systematic sampling gain in Enderton's methods.
-fn methods(text: &mut String, c: &Comparison) {
-    let _ = writeln!(
-        text,
-        "### LK and systematic sampling in the methods of several passes\n\n\
-         LK leave it to future work to quantify what their samples gain in the methods of \
+fn methods(c: &Comparison) -> Section {
+    let mut part = Section::new("LK and systematic sampling in the methods of several passes");
+    part.paragraph(format!(
+        "LK leave it to future work to quantify what their samples gain in the methods of \
          Enderton et al. RMSE relative to `enderton` with the same method and samples, the \
          geometric mean over the {} scenes of the tables above; at {SUMMED_UP} samples the range, and \
-         where it is below 1 by more than its interval.\n",
+         where it is below 1 by more than its interval.",
         c.scenes.len()
-    );
+    ));
     let row = |(name, a, b): (String, &Contender, &Contender)| {
         let of = |count| ratios(c, a, b, count);
         let mut row = vec![format!("`{name}`")];
@@ -206,41 +181,36 @@ fn methods(text: &mut String, c: &Comparison) {
         row.push(summed_up.holding(|e| below(e, 1.0)).words());
         row
     };
-    let rows: Vec<Vec<String>> = pairs(c).into_iter().map(row).collect();
-    text.push_str(&markdown_table(
-        &["design", "4", "8", "16", "32", "at 8", "smaller at 8"],
-        &rows,
-    ));
-    text.push('\n');
+    let header = ["design", "4", "8", "16", "32", "at 8", "smaller at 8"];
+    part.table(header, pairs(c).into_iter().map(row));
+    part
 }
 
 /// Designs that forget the order of fragments.
 const FORGETFUL: [&str; 2] = ["blend", "wboit"];
 
 /// Who has the least error within a budget of state.
-fn winners(text: &mut String, c: &Comparison) {
+fn winners(c: &Comparison) -> Section {
     let [.., most] = BUDGETS;
     let forgets = |s: &&MeasuredScene| {
         let winner = winner(c, s, most, false);
         FORGETFUL.iter().any(|name| winner.starts_with(&format!("`{name}`")))
     };
     let forgetful: Vec<&str> = c.scenes.iter().filter(forgets).map(|s| s.name.as_str()).collect();
-    let _ = writeln!(
-        text,
-        "### Who wins within a budget\n\n\
-         The design with the least RMSE among all whose state fits, at any of {} samples or \
+    let mut part = Section::new("Who wins within a budget");
+    part.paragraph(format!(
+        "The design with the least RMSE among all whose state fits, at any of {} samples or \
          layers; then the best of those that read the trace once. `sorted-blend` is left out: its \
          application does the work. What forgets the order of fragments ({}) is best with the \
-         most state on {} of {} scenes: {}.\n",
+         most state on {} of {} scenes: {}.",
         screendoor_study::study::comparison::COUNTS.map(|n| n.to_string()).join(", "),
         FORGETFUL.map(|name| format!("`{name}`")).join(", "),
         forgetful.len(),
         c.scenes.len(),
         if forgetful.is_empty() { "none".to_string() } else { forgetful.join(", ") }
-    );
-    let budgets: Vec<String> = BUDGETS.iter().map(|b| format!("{b:.0} bytes")).collect();
-    let mut header = vec!["scene", "passes"];
-    header.extend(budgets.iter().map(String::as_str));
+    ));
+    let mut header = vec!["scene".to_string(), "passes".to_string()];
+    header.extend(BUDGETS.iter().map(|b| format!("{b:.0} bytes")));
     let mut rows = Vec::new();
     for scene in &c.scenes {
         for single in [false, true] {
@@ -250,8 +220,8 @@ fn winners(text: &mut String, c: &Comparison) {
             rows.push(row);
         }
     }
-    text.push_str(&markdown_table(&header, &rows));
-    text.push('\n');
+    part.table(header, rows);
+    part
 }
 
 fn winner(c: &Comparison, scene: &MeasuredScene, budget: f64, single: bool) -> String {
@@ -269,14 +239,13 @@ fn winner(c: &Comparison, scene: &MeasuredScene, budget: f64, single: bool) -> S
 }
 
 /// Every pair at equal state.
-fn duels(text: &mut String, c: &Comparison) {
-    let _ = writeln!(
-        text,
-        "### Every pair at equal state\n\n\
-         Scenes on which the row's design has the smaller error, and on which the column's has, with \
+fn duels(c: &Comparison) -> Section {
+    let mut part = Section::new("Every pair at equal state");
+    part.paragraph(
+        "Scenes on which the row's design has the smaller error, and on which the column's has, with \
          the same bytes of state: the geometric mean of the ratio of their errors over the state \
          sizes of either that lie within the range of both, errors between two counts \
-         interpolated; within 2 % neither wins. — where the ranges do not meet.\n"
+         interpolated; within 2 % neither wins. — where the ranges do not meet.",
     );
     let is_bounded = |contender: &Contender| {
         let mut all = c.scenes.iter().flat_map(|s| &s.records);
@@ -284,24 +253,20 @@ fn duels(text: &mut String, c: &Comparison) {
     };
     let bounded: Vec<(usize, &Contender)> =
         (1..).zip(&c.contenders).filter(|(_, contender)| is_bounded(contender)).collect();
-    let numbers: Vec<String> = bounded.iter().map(|(i, _)| i.to_string()).collect();
-    let mut header = vec!["", "design", "won", "lost"];
-    header.extend(numbers.iter().map(String::as_str));
-    let rows: Vec<Vec<String>> = bounded
-        .iter()
-        .map(|(i, a)| {
-            let duels: Vec<Duel> = bounded.iter().map(|(_, b)| c.duel(a, b)).collect();
-            let sum = |of: fn(&Duel) -> u32| duels.iter().map(of).sum::<u32>().to_string();
-            let mut row =
-                vec![i.to_string(), format!("`{}`", a.label), sum(|d| d.won), sum(|d| d.lost)];
-            row.extend(bounded.iter().zip(&duels).map(|((_, b), d)| match d {
-                _ if a == b => String::new(),
-                Duel { won: 0, lost: 0, even: 0 } => "—".to_string(),
-                d => format!("{}:{}", d.won, d.lost),
-            }));
-            row
-        })
-        .collect();
-    text.push_str(&markdown_table(&header, &rows));
-    text.push('\n');
+    let rows = bounded.iter().map(|(i, a)| {
+        let duels: Vec<Duel> = bounded.iter().map(|(_, b)| c.duel(a, b)).collect();
+        let sum = |of: fn(&Duel) -> u32| duels.iter().map(of).sum::<u32>().to_string();
+        let mut row =
+            vec![i.to_string(), format!("`{}`", a.label), sum(|d| d.won), sum(|d| d.lost)];
+        row.extend(bounded.iter().zip(&duels).map(|((_, b), d)| match d {
+            _ if a == b => String::new(),
+            Duel { won: 0, lost: 0, even: 0 } => "—".to_string(),
+            d => format!("{}:{}", d.won, d.lost),
+        }));
+        row
+    });
+    let mut header = ["", "design", "won", "lost"].map(str::to_string).to_vec();
+    header.extend(bounded.iter().map(|(i, _)| i.to_string()));
+    part.table(header, rows);
+    part
 }

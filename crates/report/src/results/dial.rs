@@ -1,11 +1,8 @@
 //! SLAB's dial from noise to bias.
 
-use std::fmt::Write;
-
 use crate::chart::{Axis, Curve, Kind, Mark, Names, Plot, Styles, alone};
-use crate::markdown_table;
+use crate::document::{Against, Agreement, Section};
 use crate::results::Drawn;
-use crate::results::against::{Against, Agreement};
 use crate::results::claims::{RMSE, SAME, frames, ratios};
 use crate::results::ratios::{Holding, holding};
 use screendoor_study::metrics::Estimate;
@@ -71,7 +68,7 @@ fn said(trial: &Trial) -> Said {
 }
 
 /// The dial beside what is measured.
-pub(super) fn against(trial: &Trial) -> Against {
+fn against(trial: &Trial) -> Against {
     let said = said(trial);
     let all = [&said.less_noise, &said.more_bias, &said.kbuffer, &said.stochastic];
     let statements: Vec<bool> = all.iter().flat_map(|h| h.each.iter().copied()).collect();
@@ -162,18 +159,17 @@ fn place(bits: u32) -> String {
 }
 
 /// The section.
-pub(super) fn text(text: &mut String, trial: &Trial, folder: &str) {
-    against(trial).open(text);
-    let _ = writeln!(
-        text,
+pub(super) fn section(trial: &Trial) -> Section {
+    let mut section = Section::answering(against(trial));
+    section.paragraph(format!(
         "RMSE over the covered pixels, in brackets its noise and its bias: the roots of the mean \
          variance over seeds, and of the mean square of the pixels' mean errors. `slab` with \
          `normalise=none` and continuous opacity along the dial; {}. Beside it b = {SLAB_LAYERS} with \
-         discrete opacity (`{DISCRETE}`), and what the ends are said to be: `{}` and `{}`.\n",
+         discrete opacity (`{DISCRETE}`), and what the ends are said to be: `{}` and `{}`.",
         frames(trial),
         ENDS[0],
         ENDS[1]
-    );
+    ));
     let mut columns: Vec<(String, String)> =
         DIAL.iter().map(|bits| (place(*bits), dialled(*bits))).collect();
     columns.insert(0, ("b = n, discrete".to_string(), DISCRETE.to_string()));
@@ -185,29 +181,21 @@ pub(super) fn text(text: &mut String, trial: &Trial, folder: &str) {
             format!("{:.2} ({noise:.2}, {bias:.2})", v.covered.rmse.value)
         })
     };
-    let rows: Vec<Vec<String>> = trial
-        .scenes
-        .iter()
-        .map(|scene| {
-            let mut row = vec![scene.name.clone()];
-            row.extend(columns.iter().map(|(_, design)| cell(scene, design)));
-            row
-        })
-        .collect();
-    let mut header = vec!["scene"];
-    header.extend(columns.iter().map(|(name, _)| name.as_str()));
-    text.push_str(&markdown_table(&header, &rows));
-    text.push('\n');
+    let rows = trial.scenes.iter().map(|scene| {
+        let cells = columns.iter().map(|(_, design)| cell(scene, design));
+        std::iter::once(scene.name.clone()).chain(cells)
+    });
+    let names = columns.iter().map(|(name, _)| name.as_str());
+    section.table(std::iter::once("scene").chain(names), rows);
     for (name, figure) in figures(trial) {
-        let _ = writeln!(
-            text,
-            "![Curves of bias over noise.]({folder}/{})\n\n\
-             Bias over noise along the dial: each curve is a scene, each mark a place, from b = {} \
-             at its name to infinity, where no noise is left.\n",
-            figure.file(name),
+        let caption = format!(
+            "Bias over noise along the dial: each curve is a scene, each mark a place, from b = {} \
+             at its name to infinity, where no noise is left.",
             DIAL[0]
         );
+        section.figure(figure.file(name), "Curves of bias over noise.", caption);
     }
+    section
 }
 
 #[cfg(test)]

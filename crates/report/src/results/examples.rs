@@ -1,9 +1,6 @@
 //! Enderton's examples and what the paper says of bias.
 
-use std::fmt::Write;
-
-use crate::markdown_table;
-use crate::results::against::{Against, Agreement};
+use crate::document::{Against, Agreement, Section};
 use screendoor_study::study::publications::examples::{ExampleRow, Moments};
 use screendoor_study::study::publications::methods::Methods;
 
@@ -27,7 +24,7 @@ fn short(row: &ExampleRow) -> String {
 }
 
 /// The examples beside the paper's.
-pub(super) fn against(m: &Methods) -> Against {
+fn against(m: &Methods) -> Against {
     let printed: Vec<bool> = m.examples.iter().map(as_printed).collect();
     let holding = printed.iter().filter(|holds| **holds).count();
     // The design agrees with enumeration to what 65 536 draws tell.
@@ -59,35 +56,28 @@ pub(super) fn against(m: &Methods) -> Against {
 }
 
 /// The section.
-pub(super) fn text(text: &mut String, m: &Methods) {
-    against(m).open(text);
-    let _ = writeln!(
-        text,
+pub(super) fn section(m: &Methods) -> Option<Section> {
+    let mut section = Section::answering(against(m));
+    section.paragraph(
         "Standard deviation of a pixel of 4 samples, for red, green and blue where they differ: as \
          printed by Enderton et al. (TVCG 2011, section 3), by enumeration of every mask, and as \
          `enderton` gives it with masks drawn among all covered samples, over 65 536 pixels and \
          seeds; beside it the same method with the samples that `lk` and `systematic` choose, \
-         which the paper could not have.\n"
+         which the paper could not have.",
     );
-    let rows: Vec<Vec<String>> = m.examples.iter().map(example_row).collect();
     let header = ["example", "method", "printed", "enumerated", "enderton", "lk", "systematic"];
-    text.push_str(&markdown_table(&header, &rows));
-    let _ = writeln!(
-        text,
-        "\nPrinted and enumerated are called different by more than 0.01. Naive sampling in example 2 is \
-         printed for a single sample, which has {:.3}. {}\n\n\
-         What the paper says of bias (sections 4 and 6):\n",
+    section.table(header, m.examples.iter().map(example_row));
+    section.paragraph(format!(
+        "Printed and enumerated are called different by more than 0.01. Naive sampling in example 2 is \
+         printed for a single sample, which has {:.3}. {}",
         // One sample of a white or 0.25 gray pixel.
         single_sample_deviation(),
         corrected(&m.examples),
-    );
-    let rows: Vec<Vec<String>> = m
-        .bias_cases
-        .iter()
-        .map(|c| vec![c.name.clone(), c.printed.to_string(), c.exact.clone(), c.measured.clone()])
-        .collect();
-    text.push_str(&markdown_table(&["case", "printed", "enumerated", "measured"], &rows));
-    text.push('\n');
+    ));
+    section.paragraph("What the paper says of bias (sections 4 and 6):");
+    let rows = m.bias_cases.iter().map(|c| [&*c.name, c.printed, &c.exact, &c.measured]);
+    section.table(["case", "printed", "enumerated", "measured"], rows);
+    Some(section)
 }
 
 /// Where the correction of the depth-based method makes less noise, and where more.
@@ -119,12 +109,12 @@ fn single_sample_deviation() -> f64 {
     0.75 * (behind * (1.0 - behind)).sqrt()
 }
 
-fn example_row(row: &ExampleRow) -> Vec<String> {
+fn example_row(row: &ExampleRow) -> [String; 7] {
     let other = |name: &str| {
         let found: Option<&(&str, Moments)> = row.others.iter().find(|(n, _)| *n == name);
         found.map_or("—".to_string(), |(_, m)| deviations(m.deviation))
     };
-    vec![
+    [
         row.example.to_string(),
         row.method.to_string(),
         row.printed.map_or("—".to_string(), |p| {

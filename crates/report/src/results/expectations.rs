@@ -1,25 +1,19 @@
 //! Whether what is declared unbiased is.
 
-use std::fmt::Write;
-
-use crate::markdown_table;
+use crate::document::Section;
 use crate::results::plain;
 use crate::results::ratios::{Holding, holding};
 use screendoor_study::metrics::student_t;
 use screendoor_study::study::publications::{DESIGNS, MIXED, MeanError, Publications};
 
 /// The section; nothing where no expectations were measured.
-pub(super) fn text(text: &mut String, p: &Publications) {
-    if p.means.is_empty() {
-        return;
-    }
+pub(super) fn section(p: &Publications) -> Option<Section> {
     let found = Found::of(&p.means);
-    let Some(closely) = p.means.iter().find(|m| m.scene == MIXED) else { return };
-    let Some(briefly) = p.means.iter().rfind(|m| m.scene != MIXED) else { return };
-    let _ = writeln!(
-        text,
-        "## Is it unbiased?\n\n\
-         Mean of picture minus exact over the covered pixels: on `{MIXED}`, whose triangles come in \
+    let closely = p.means.iter().find(|m| m.scene == MIXED)?;
+    let briefly = p.means.iter().rfind(|m| m.scene != MIXED)?;
+    let mut section = Section::new("Is it unbiased?");
+    section.paragraph(format!(
+        "Mean of picture minus exact over the covered pixels: on `{MIXED}`, whose triangles come in \
          random order, at {} × {} pixels over {} seeds; on every scene at 8 samples, {} × {} pixels, \
          over {} seeds. The paper takes LK figure 7 to be unbiased. Where primitives' edges share \
          pixels in mixed order, chance decides which fragments belong to one surface. A fragment \
@@ -27,51 +21,49 @@ pub(super) fn text(text: &mut String, p: &Publications) {
          if the surface was *written* to A and is nearer, A fails the depth test, no conflict is \
          seen, and B is numbered into the same surface, with a reference value complementary to \
          A's low one, thus rather high. If it was not written, the conflict is seen and B gets a \
-         fresh value. On average B passes too rarely.\n\n\
-         Measured: `{}` is within what chance allows in this table (Bonferroni, 1 in 100) {}; it is \
-         off by up to {:.1} standard errors. Designs declared unbiased (`track=covered`: the \
-         tracking sees all covered samples, for a counter of log2(N)+1 bits more per pixel; and \
-         every other variant in which chance does not decide the surface) are within it {}; the \
-         largest deviation is {:.1} standard errors.\n",
+         fresh value. On average B passes too rarely.",
         closely.side,
         closely.side,
         closely.run.seeds,
         briefly.side,
         briefly.side,
         briefly.run.seeds,
+    ));
+    section.paragraph(format!(
+        "Measured: `{}` is within what chance allows in this table (Bonferroni, 1 in 100) {}; it is \
+         off by up to {:.1} standard errors. Designs declared unbiased (`track=covered`: the \
+         tracking sees all covered samples, for a counter of log2(N)+1 bits more per pixel; and \
+         every other variant in which chance does not decide the surface) are within it {}; the \
+         largest deviation is {:.1} standard errors.",
         DESIGNS[0],
         found.lk.words(),
         found.lk_most,
         found.unbiased.words(),
         found.unbiased_most,
-    );
-    let rows: Vec<Vec<String>> = p
-        .means
-        .iter()
-        .map(|m| {
-            let MeanError { scene, side, run } = m;
-            let mean = run.covered.mean;
-            let outside = mean.low > 0.0 || mean.high < 0.0;
-            vec![
-                scene.clone(),
-                format!("{side} × {side}"),
-                format!("`{}`", run.design),
-                run.samples.to_string(),
-                format!("{:+.4} ± {:.4}", mean.value, mean.half_width()),
-                if outside { format!("{:.1} σ", deviation(m)) } else { "within".to_string() },
-                plain(run.covered.rmse),
-                if run.kept().unbiased { "unbiased" } else { "biased" }.to_string(),
-            ]
-        })
-        .collect();
+    ));
+    let row = |m: &MeanError| {
+        let MeanError { scene, side, run } = m;
+        let mean = run.covered.mean;
+        let outside = mean.low > 0.0 || mean.high < 0.0;
+        [
+            scene.clone(),
+            format!("{side} × {side}"),
+            format!("`{}`", run.design),
+            run.samples.to_string(),
+            format!("{:+.4} ± {:.4}", mean.value, mean.half_width()),
+            if outside { format!("{:.1} σ", deviation(m)) } else { "within".to_string() },
+            plain(run.covered.rmse),
+            if run.kept().unbiased { "unbiased" } else { "biased" }.to_string(),
+        ]
+    };
     let header =
         ["scene", "pixels", "design", "samples", "mean error", "off 0", "RMSE", "declared"];
-    text.push_str(&markdown_table(&header, &rows));
-    let _ = writeln!(
-        text,
-        "\n(σ: standard errors; 'within' is within the 95 % interval, one of twenty is expected \
-         outside by chance.)\n"
+    section.table(header, p.means.iter().map(row));
+    section.paragraph(
+        "(σ: standard errors; 'within' is within the 95 % interval, one of twenty is expected \
+         outside by chance.)",
     );
+    Some(section)
 }
 
 /// How far a mean error lies from 0, in standard errors.

@@ -1,7 +1,6 @@
 //! The document's pictures.
 
-use std::fmt::Write;
-
+use crate::document::Section;
 use crate::results::Drawn;
 use crate::{Panel, montage};
 use screendoor_study::study::publications::{NamedPicture, Publications};
@@ -142,36 +141,25 @@ pub(super) fn of(pictures: &[NamedPicture]) -> Vec<(&'static str, Drawn)> {
 }
 
 /// The built-in scenes and the figures that belong to no other section.
-pub(super) fn pictures(text: &mut String, p: &Publications, folder: &str) {
+pub(super) fn section(p: &Publications) -> Option<Section> {
     if p.gallery.is_empty() {
-        return;
+        return None;
     }
     let scenes: Vec<&str> = p.gallery.iter().map(|(name, _)| name.as_str()).collect();
-    let _ = writeln!(
-        text,
-        "## Pictures\n\n![The built-in scenes]({folder}/{GALLERY}.png)\n\n\
-         The built-in scenes, composited exactly: {}.\n",
-        scenes.join(", ")
-    );
-    show(text, &p.pictures, folder, |file| ["figure-9", "figure-10"].contains(&file));
+    let caption = format!("The built-in scenes, composited exactly: {}.", scenes.join(", "));
+    let mut section = Section::new("Pictures");
+    section.figure(format!("{GALLERY}.png"), "The built-in scenes", caption);
+    show(&mut section, &p.pictures, &["figure-9", "figure-10"]);
+    Some(section)
 }
 
-/// Shows those of the figures that are made of `pictures` whose files are `wanted`.
-pub(super) fn show(
-    text: &mut String,
-    pictures: &[NamedPicture],
-    folder: &str,
-    wanted: impl Fn(&str) -> bool,
-) {
+/// Shows those of the figures whose files are `wanted` that can be made of `pictures`.
+pub(super) fn show(section: &mut Section, pictures: &[NamedPicture], wanted: &[&str]) {
     let there = |name: &&str| pictures.iter().any(|(n, _)| n == name);
-    for figure in FIGURES.iter().filter(|f| wanted(f.file) && f.panels.iter().all(there)) {
+    for figure in FIGURES.iter().filter(|f| wanted.contains(&f.file) && f.panels.iter().all(there))
+    {
         // The caption's first sentence is what stands for the picture.
         let what = figure.caption.split(". ").next().unwrap_or(figure.file).replace('`', "");
-        let _ = writeln!(
-            text,
-            "![{what}]({folder}/{file}.png)\n\n{caption}\n",
-            file = figure.file,
-            caption = figure.caption
-        );
+        section.figure(format!("{}.png", figure.file), what, figure.caption);
     }
 }

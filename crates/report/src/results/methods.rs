@@ -1,80 +1,62 @@
 //! The results' part on the methods: Wyman's probabilities, hashes, LK figure 8.
 
-use std::fmt::Write;
-
-use crate::markdown_table;
-use crate::results::against::{Against, Agreement, above};
+use crate::document::{Against, Agreement, Section};
+use crate::results::figures::show;
+use crate::results::ratios::above;
 use crate::results::{plain, ratio};
 use screendoor_study::metrics::Estimate;
-use screendoor_study::study::publications::hashes::TRIES;
+use screendoor_study::study::publications::hashes::{HashRow, TRIES};
 use screendoor_study::study::publications::methods::{Figure8, MOST_BITS, Methods, TABLE_BITS};
 use screendoor_study::study::publications::{COUNTS, Published};
+use screendoor_study::study::record::Record;
 
-/// The text, but for Enderton's examples.
-pub(super) fn text(text: &mut String, m: &Methods) {
-    probabilities(text, m);
-    if !m.hashes.is_empty() {
-        hashes(text, m);
-    }
-    figure_8(text, m);
-}
-
-fn probabilities(text: &mut String, m: &Methods) {
+/// Wyman's probabilities.
+pub(super) fn probabilities(m: &Methods) -> Option<Section> {
     let p = &m.probabilities;
-    let _ = writeln!(
-        text,
-        "## Wyman's probabilities\n\n\
-         `P_b(s, t)` (Wyman 2016, equation 1): the probability that a mask of t of b bits is not \
+    let mut section = Section::new("Wyman's probabilities");
+    section.paragraph(format!(
+        "`P_b(s, t)` (Wyman 2016, equation 1): the probability that a mask of t of b bits is not \
          wholly hidden behind one of s bits. Over every b up to {MOST_BITS}, s and t the equation \
          differs from enumeration of every mask by at most {:.1e}, and the probability without \
          stratification, 1 − ((b−t)/b)^(b−s), by at most {:.1e} from that of bits drawn on their \
-         own. For b = {TABLE_BITS}, with stratification (enumerated) and without:\n",
+         own. For b = {TABLE_BITS}, with stratification (enumerated) and without:",
         p.worst_stratified, p.worst_independent
-    );
-    let columns: Vec<String> = (0..=TABLE_BITS).map(|t| format!("t = {t}")).collect();
-    let mut header = vec!["s"];
-    header.extend(columns.iter().map(String::as_str));
-    let rows: Vec<Vec<String>> = p
-        .table
-        .iter()
-        .enumerate()
-        .map(|(s, row)| {
-            let mut cells = vec![s.to_string()];
-            cells.extend(row.iter().map(|[a, b, c]| format!("{a:.4} ({b:.4}), {c:.4}")));
-            cells
-        })
-        .collect();
-    text.push_str(&markdown_table(&header, &rows));
-    text.push('\n');
+    ));
+    let columns = (0..=TABLE_BITS).map(|t| format!("t = {t}"));
+    let rows = p.table.iter().enumerate().map(|(s, row)| {
+        let cells = row.iter().map(|[a, b, c]| format!("{a:.4} ({b:.4}), {c:.4}"));
+        std::iter::once(s.to_string()).chain(cells)
+    });
+    section.table(std::iter::once("s".to_string()).chain(columns), rows);
+    Some(section)
 }
 
-fn hashes(text: &mut String, m: &Methods) {
-    let rows: Vec<Vec<String>> = m
-        .hashes
-        .iter()
-        .map(|h| {
-            vec![
-                format!("`{}`", h.reference),
-                if h.prehash { "yes" } else { "no" }.to_string(),
-                orders(h.orders),
-                orders(h.low_orders),
-                format!("{:.3}", h.between_surfaces),
-                format!("{:.3}", h.between_seeds),
-                format!("{:.4}", h.transmittance),
-                plain(h.rmse),
-                plain(h.rmse_blocks),
-                format!("{:+.3} ± {:.3}", h.mean.value, h.mean.half_width()),
-            ]
-        })
-        .collect();
+/// Hashes of reference values; nothing where none was measured.
+pub(super) fn hashes(m: &Methods) -> Option<Section> {
+    if m.hashes.is_empty() {
+        return None;
+    }
+    let row = |h: &HashRow| {
+        [
+            format!("`{}`", h.reference),
+            if h.prehash { "yes" } else { "no" }.to_string(),
+            orders(h.orders),
+            orders(h.low_orders),
+            format!("{:.3}", h.between_surfaces),
+            format!("{:.3}", h.between_seeds),
+            format!("{:.4}", h.transmittance),
+            plain(h.rmse),
+            plain(h.rmse_blocks),
+            format!("{:+.3} ± {:.3}", h.mean.value, h.mean.half_width()),
+        ]
+    };
     let good = m.hashes.iter().filter(|h| h.scrambles && h.reference != "white");
     let errors: Vec<f64> = good.map(|h| h.rmse.value).collect();
     let low = errors.iter().copied().fold(f64::INFINITY, f64::min);
     let high = errors.iter().copied().fold(0.0, f64::max);
-    let _ = writeln!(
-        text,
-        "## Reference-value hashes\n\n\
-         What the hashes reach, and whether it matters. *Orders*: different orders of 16 \
+    let mut section = Section::new("Reference-value hashes");
+    section.paragraph(format!(
+        "What the hashes reach, and whether it matters. *Orders*: different orders of 16 \
          consecutive reference values among {TRIES} surfaces and pixels, in LK's use, where the \
          highest bits are scrambled by all below; 32 768 exist. *Low*: different permutations of \
          the lowest 4 bits over as many seeds, in Burley's use. *Correlation*: the largest over \
@@ -82,8 +64,8 @@ fn hashes(text: &mut String, m: &Methods) {
          each: chance stays below 0.016 in 99.99 %. *Transmittance*: four layers of alpha 0.3 in one \
          pixel of 8 samples without a spatial index, over 4096 runs of consecutive surface \
          numbers; 0.2401 is right. *RMSE*, also of means of 4 × 4 pixels, and *mean* error of `lk` on eight \
-         layers of alpha 0.3 at 8 samples.\n"
-    );
+         layers of alpha 0.3 at 8 samples."
+    ));
     let header = [
         "hash",
         "prehash",
@@ -96,14 +78,14 @@ fn hashes(text: &mut String, m: &Methods) {
         "RMSE 4×4",
         "mean",
     ];
-    text.push_str(&markdown_table(&header, &rows));
-    let _ = writeln!(
-        text,
-        "\nAmong the scrambles that tell surfaces apart the RMSE lies between {low:.2} and {high:.2}: \
+    section.table(header, m.hashes.iter().map(row));
+    section.paragraph(format!(
+        "Among the scrambles that tell surfaces apart the RMSE lies between {low:.2} and {high:.2}: \
          on these eight layers the choice of the hash changes the picture's error by at most \
-         {:.1} %.\n",
+         {:.1} %.",
         100.0 * (high / low - 1.0)
-    );
+    ));
+    Some(section)
 }
 
 /// A number of permutations; independent numbers form none.
@@ -129,7 +111,7 @@ fn printed_advantage() -> f64 {
 }
 
 /// Figure 8 beside the paper's.
-pub(super) fn figure_8_against(m: &Methods) -> Against {
+fn figure_8_against(m: &Methods) -> Against {
     let f = &m.figure_8;
     let pair = rmse(f, "lk").zip(rmse(f, "enderton"));
     let found = pair.map(|(lk, e)| lk.ratio(e));
@@ -161,30 +143,26 @@ pub(super) fn figure_8_against(m: &Methods) -> Against {
     }
 }
 
-fn figure_8(text: &mut String, m: &Methods) {
+/// Figure 8's section.
+pub(super) fn figure_8(m: &Methods) -> Option<Section> {
     let f = &m.figure_8;
     let s = &f.scene.statistics;
-    figure_8_against(m).open(text);
-    let _ = writeln!(
-        text,
+    let mut section = Section::answering(figure_8_against(m));
+    section.paragraph(format!(
         "`{}` as billboards of alpha 0.05 at 16 samples, {} seeds: {:.2} million fragments, {:.0} \
-         per covered pixel (95 % have at most {}).\n",
+         per covered pixel (95 % have at most {}).",
         f.source,
         m.effort.seeds,
         s.fragments as f64 / 1e6,
         s.depth_complexity.mean,
         s.depth_complexity.p95
-    );
-    let rows: Vec<Vec<String>> = f
-        .scene
-        .records
-        .iter()
-        .map(|r| {
-            let e = r.covered.rmse;
-            let of = |other| rmse(f, other).map_or("—".to_string(), |o| ratio(e, o));
-            vec![format!("`{}`", r.series), plain(e), of("enderton"), of("enderton:mask=naive")]
-        })
-        .collect();
-    text.push_str(&markdown_table(&["design", "RMSE", "÷ enderton", "÷ naive"], &rows));
-    text.push('\n');
+    ));
+    let row = |r: &Record| {
+        let e = r.covered.rmse;
+        let of = |other| rmse(f, other).map_or("—".to_string(), |o| ratio(e, o));
+        [format!("`{}`", r.series), plain(e), of("enderton"), of("enderton:mask=naive")]
+    };
+    section.table(["design", "RMSE", "÷ enderton", "÷ naive"], f.scene.records.iter().map(row));
+    show(&mut section, &m.pictures, &["figure-8"]);
+    Some(section)
 }

@@ -1,7 +1,7 @@
-//! `docs/RESULTS.md`: the publications' figures beside ours.
+//! `docs/RESULTS.md`: the publications' figures beside ours. A section is a function that gives
+//! it, and its entry in the list of its chapter.
 
 mod account;
-mod against;
 mod claims;
 mod comparison;
 mod dial;
@@ -10,6 +10,7 @@ mod expectations;
 mod figures;
 mod methods;
 mod noise;
+mod pixel_orders;
 mod ratios;
 mod slab;
 mod summary;
@@ -18,16 +19,15 @@ mod table_1;
 use std::fmt::Write;
 use std::path::PathBuf;
 
-pub use against::{Against, Agreement};
 pub use figures::{FIGURES, Figure};
 pub use summary::{check_marks, in_short};
 
-use crate::{markdown_table, stability};
+use crate::document::{Against, Section, Text};
+use crate::stability;
 use screendoor_study::metrics::Estimate;
-use screendoor_study::study::comparison::Comparison;
 use screendoor_study::study::file::Publication;
 use screendoor_study::study::publications::methods::Methods;
-use screendoor_study::study::publications::{Publications, Reproduced, RowDifference};
+use screendoor_study::study::publications::{Publications, Reproduced};
 use screendoor_trace::error::Result;
 use screendoor_trace::output::OutputFile;
 use screendoor_trace::param::Options;
@@ -35,13 +35,27 @@ use screendoor_trace::picture::{Picture, write_png};
 
 /// A publication's figures beside ours.
 #[derive(Clone, Debug)]
-pub struct Document {
-    /// The text, in sections headed by `##`.
-    pub markdown: String,
-    /// What is printed, measured and found, of each section that has such.
-    pub against: Vec<Against>,
-    /// What the text shows: file names without their endings.
+pub struct Chapter {
+    /// What is said.
+    pub sections: Vec<Section>,
+    /// What is told in short beside what is set against publications.
+    in_short: Vec<Text>,
+    /// What the sections show: file names without their endings.
     pub figures: Vec<(&'static str, Drawn)>,
+}
+
+impl Chapter {
+    /// What is printed, measured and found.
+    pub fn against(&self) -> impl Iterator<Item = &Against> {
+        self.sections.iter().flat_map(Section::against)
+    }
+
+    /// As Markdown, what is in short first. `folder` is where the figures lie, as seen from it.
+    pub fn to_markdown(&self, folder: &str) -> String {
+        let lines = self.against().map(Against::in_short).chain(self.in_short.iter().cloned());
+        let sections = self.sections.iter().map(|section| section.to_markdown(2, folder));
+        std::iter::once(summary::of(lines.collect())).chain(sections).collect()
+    }
 }
 
 /// What a file of a document shows.
@@ -74,54 +88,74 @@ impl Drawn {
     }
 }
 
-/// The document of what was measured. `folder` is where the figures lie, as seen from it.
-pub fn document(measured: &Reproduced, folder: &str) -> Document {
-    let (markdown, against, figures) = match measured {
+/// The chapter of what was measured.
+pub fn chapter(measured: &Reproduced) -> Chapter {
+    let (mut in_short, mut figures) = (Vec::new(), Vec::new());
+    let sections = match measured {
         Reproduced::LaineKarras(p) => {
-            let against = vec![
-                table_1::against(p),
-                table_1::fewer_samples(p),
-                noise::figure_1(p),
-                noise::figure_3b(p),
-                noise::figure_5(p),
-                noise::figure_6(p),
-            ];
-            (laine_karras(p, folder), against, figures::figures(p))
+            figures = figures::figures(p);
+            LAINE_KARRAS.iter().filter_map(|section| section(p)).collect()
         }
         Reproduced::Methods(m) => {
-            let mut against = vec![examples::against(m), methods::figure_8_against(m)];
-            against.extend(claims::against(&m.claims));
-            (methods_text(m, folder), against, figures::of(&m.pictures))
+            figures = figures::of(&m.pictures);
+            METHODS.iter().filter_map(|section| section(m)).collect()
         }
-        Reproduced::Slab(c) => (slab::text(c, folder), slab_against(c), dial::figures(&c.dial)),
+        Reproduced::Slab(c) => {
+            figures = dial::figures(&c.dial);
+            vec![slab::section(c), dial::section(&c.dial)]
+        }
         Reproduced::Comparison(c) => {
-            (comparison::text(c, folder), slab_against(c), dial::figures(&c.dial))
+            in_short = comparison::in_short(c);
+            figures = dial::figures(&c.dial);
+            vec![comparison::section(c), slab::section(c), dial::section(&c.dial)]
         }
-        Reproduced::Stability(s) => (stability::sections(s), Vec::new(), Vec::new()),
+        Reproduced::Stability(s) => stability::sections(s),
     };
-    let others = match measured {
-        Reproduced::Comparison(c) => comparison::in_short(c),
-        _ => Vec::new(),
-    };
-    let in_short = match against.is_empty() {
-        true => String::new(),
-        false => summary::of(&against, &others),
-    };
-    Document { markdown: in_short + &markdown, against, figures }
+    Chapter { sections, in_short, figures }
 }
+
+/// A section of a chapter; none where nothing of it was measured.
+type Of<T> = fn(&T) -> Option<Section>;
+
+const LAINE_KARRAS: [Of<Publications>; 9] = [
+    table_1::section,
+    table_1::fewer_samples_section,
+    expectations::section,
+    noise::figure_1_section,
+    noise::figure_3b_section,
+    noise::figure_5_section,
+    noise::figure_6_section,
+    pixel_orders::section,
+    figures::section,
+];
+
+const METHODS: [Of<Methods>; 8] = [
+    examples::section,
+    methods::probabilities,
+    methods::hashes,
+    methods::figure_8,
+    claims::masks_section,
+    claims::dither_section,
+    claims::rounds_section,
+    claims::hashing_section,
+];
 
 /// The parts of RESULTS.md, each of which can be measured on its own.
 pub const PARTS: [Publication; 3] =
     [Publication::LaineKarras, Publication::Methods, Publication::Comparison];
 
+/// Where its figures lie, as seen from RESULTS.md.
+pub const FIGURES_FOLDER: &str = "figures";
+
 /// RESULTS.md: what was `measured`, and of the other parts what the document said
 /// `before`.
-pub fn results(before: &str, measured: &[(Publication, Document)]) -> String {
-    let mut text = PREAMBLE.to_string();
+pub fn results(before: &str, measured: &[(Publication, Chapter)]) -> String {
+    let mut text = preamble().to_markdown(1, FIGURES_FOLDER);
     for part in PARTS {
         let name = part.name();
         let [start, end] = ["begin", "end"].map(|edge| format!("<!-- {edge} of part {name} -->\n"));
-        let new = measured.iter().find(|(p, _)| *p == part).map(|(_, d)| d.markdown.clone());
+        let own = measured.iter().find(|(p, _)| *p == part);
+        let new = own.map(|(_, chapter)| chapter.to_markdown(FIGURES_FOLDER));
         let old = || {
             let from = before.find(&start)? + start.len();
             let length = before[from..].find(&end)?;
@@ -134,80 +168,20 @@ pub fn results(before: &str, measured: &[(Publication, Document)]) -> String {
     text
 }
 
-const PREAMBLE: &str = "# Results\n\n\
-    Written by `screendoor reproduce`, the figures within sentences too; `--part` measures one part \
-    and leaves the others as they are. Errors are in 8-bit units (1/255 of the range from black to \
-    white), on linear values where nothing else is said. ± and [ ] are 95 % intervals over seeds: \
-    Student's t on the mean square, and for ratios both sides' relative widths in quadrature.\n\n\
-    LK is Laine and Karras, *Stratified Sampling for Stochastic Transparency*, EGSR 2011. To rerun: \
-    `screendoor reproduce --models FOLDER`, where the folder holds the models named below (without \
-    it the built-in scenes are measured).\n\n";
-
-fn laine_karras(p: &Publications, folder: &str) -> String {
-    let mut text = String::new();
-    table_1::text(&mut text, p);
-    table_1::fewer_samples_text(&mut text, p);
-    account::text(&mut text, p);
-    expectations::text(&mut text, p);
-    noise::figure_1_text(&mut text, p, folder);
-    noise::figure_3b_text(&mut text, p, folder);
-    noise::figure_5_text(&mut text, p);
-    noise::figure_6_text(&mut text, p, folder);
-    pixel_orders(&mut text, p);
-    figures::pictures(&mut text, p, folder);
-    text
-}
-
-fn slab_against(c: &Comparison) -> Vec<Against> {
-    vec![slab::against(c), dial::against(&c.dial)]
-}
-
-fn methods_text(m: &Methods, folder: &str) -> String {
-    let mut text = String::new();
-    examples::text(&mut text, m);
-    methods::text(&mut text, m);
-    figures::show(&mut text, &m.pictures, folder, |_| true);
-    claims::text(&mut text, &m.claims);
-    text
-}
-
-fn pixel_orders(text: &mut String, p: &Publications) {
-    if p.pixel_orders.is_empty() {
-        return;
-    }
-    let _ = writeln!(
-        text,
-        "## Pixel orders\n\n\
-         LK section 3.1: a Morton curve gives even and odd rows different expectations. Difference \
-         of the means of even and odd rows of one surface, alpha 0.1 to 0.6, 4 samples, 128 × 128 \
-         pixels, root mean square over seeds and alphas, in 8-bit units. {}\n",
-        morton(&p.pixel_orders)
+fn preamble() -> Section {
+    let mut preamble = Section::new("Results");
+    preamble.paragraph(
+        "Written by `screendoor reproduce`, the figures within sentences too; `--part` measures one part \
+         and leaves the others as they are. Errors are in 8-bit units (1/255 of the range from black to \
+         white), on linear values where nothing else is said. ± and [ ] are 95 % intervals over seeds: \
+         Student's t on the mean square, and for ratios both sides' relative widths in quadrature.",
     );
-    let rows: Vec<Vec<String>> = p
-        .pixel_orders
-        .iter()
-        .map(|o| vec![format!("`{}`", o.design), format!("{:.3}", o.difference)])
-        .collect();
-    text.push_str(&markdown_table(&["design", "difference"], &rows));
-    text.push('\n');
-}
-
-/// How much further apart a Morton curve puts even and odd rows than a Hilbert curve.
-fn morton(found: &[RowDifference]) -> String {
-    let of = |design: &str| found.iter().find(|o| o.design == design).map(|o| o.difference);
-    let times = |morton, hilbert| Some(of(morton)? / of(hilbert)?);
-    let bare =
-        times("lk:pixel-order=morton,reference=radical-inverse", "lk:reference=radical-inverse");
-    let hashed = times("lk:pixel-order=morton", "lk");
-    let Some((bare, hashed)) = bare.zip(hashed) else { return "Not measured.".to_string() };
-    // Twice as far is no chance: the figures are over hundreds of frames.
-    let there = |times: f64| if times > 2.0 { "the effect is there" } else { "no effect is seen" };
-    format!(
-        "Morton's difference ÷ Hilbert's is {bare:.1} in the unscrambled sequence ({}) and \
-         {hashed:.1} with figure 4's hash ({}).",
-        there(bare),
-        there(hashed)
-    )
+    preamble.paragraph(
+        "LK is Laine and Karras, *Stratified Sampling for Stochastic Transparency*, EGSR 2011. To rerun: \
+         `screendoor reproduce --models FOLDER`, where the folder holds the models named below (without \
+         it the built-in scenes are measured).",
+    );
+    preamble
 }
 
 fn plain(e: Estimate) -> String {
@@ -231,23 +205,8 @@ mod tests {
     use screendoor_study::study::publications::{Effort, measure_publication};
 
     #[test]
-    fn a_curve_that_parts_rows_is_told_from_one_that_does_not() {
-        let of = |design: &str, difference| RowDifference { design: design.into(), difference };
-        let list = |bare| {
-            [
-                of("lk", 0.4),
-                of("lk:pixel-order=morton", 0.4),
-                of("lk:reference=radical-inverse", 0.5),
-                of("lk:pixel-order=morton,reference=radical-inverse", bare),
-            ]
-        };
-        let [found, none] = [15.5, 0.5].map(|bare| morton(&list(bare)));
-        assert!(
-            found.contains("31.0 in the unscrambled sequence (the effect is there)"),
-            "{found}"
-        );
-        assert!(none.contains("1.0 in the unscrambled sequence (no effect is seen)"), "{none}");
-        assert_eq!(morton(&[]), "Not measured.");
+    fn the_document_of_the_tree_begins_with_what_is_said_of_all() {
+        assert!(include_str!("../../../../docs/RESULTS.md").starts_with(&results("", &[])));
     }
 
     #[test]
@@ -257,21 +216,22 @@ mod tests {
         for part in [Publication::LaineKarras, Publication::Methods, Publication::Slab] {
             let measured = measure_publication(part, &quiet.lab(), effort).unwrap();
             assert_eq!((measured.publication(), measured.missing().len()), (part, 0));
-            let document = document(&measured, "verification");
-            let table = summary(&document.against).body.0;
+            let chapter = chapter(&measured);
+            let list: Vec<Against> = chapter.against().cloned().collect();
+            let table = summary(&list).body.0;
             let asked = std::cell::RefCell::new(Vec::new());
-            let found = sections(&document.markdown, &|file| {
+            let found = sections(&chapter.sections, &|file| {
                 asked.borrow_mut().push(file.to_string());
                 None
             });
-            for against in &document.against {
+            for against in &list {
                 let own = found.iter().find(|s| s.title == against.section).unwrap();
                 assert!(table.contains(&format!("href=\"#{}\"", own.anchor)), "{}", own.anchor);
                 let verdict = format!("<strong>Verdict</strong>: {}", against.agreement.word());
                 assert!(own.body.0.contains(&verdict), "{}", own.body.0);
                 named.push(against.section.clone());
             }
-            let made = document.figures.iter().map(|(name, drawn)| drawn.file(name));
+            let made = chapter.figures.iter().map(|(name, drawn)| drawn.file(name));
             let (mut made, mut asked) = (made.collect::<Vec<_>>(), asked.into_inner());
             made.sort();
             asked.sort();

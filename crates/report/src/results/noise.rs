@@ -1,11 +1,9 @@
 //! LK figures 1, 3b, 5 and 6: what their pictures show, in numbers.
 
-use std::fmt::Write;
-
-use crate::markdown_table;
-use crate::results::against::{Against, Agreement, above, below};
+use crate::document::{Against, Agreement, Section};
 use crate::results::figures::show;
 use crate::results::plain;
+use crate::results::ratios::{above, below};
 use screendoor_study::metrics::Estimate;
 use screendoor_study::study::publications::{
     BLOCKS, CORRELATION_SEEDS, EdgeNoise, FarSamples, Noise, Publications,
@@ -21,26 +19,22 @@ fn pair<'a>(list: &'a [Noise], designs: [&str; 2]) -> Option<[&'a Noise; 2]> {
 }
 
 /// RMSE over blocks of pixels, and by how much it falls; panels named where several.
-fn blocks(text: &mut String, panels: &[(&str, &[Noise])]) {
+fn blocks(section: &mut Section, panels: &[(&str, &[Noise])]) {
     let named = panels.len() > 1;
     let sizes = BLOCKS.map(|b| format!("{b}×{b}"));
     let mut header = if named { vec!["panel", "design"] } else { vec!["design"] };
     header.extend(sizes.iter().map(String::as_str));
     let fall = format!("{} ÷ {}", sizes[0], sizes[BLOCKS.len() - 1]);
     header.push(&fall);
-    let rows: Vec<Vec<String>> = panels
-        .iter()
-        .flat_map(|(panel, list)| list.iter().map(move |noise| (panel, noise)))
-        .map(|(panel, noise)| {
-            let mut row = if named { vec![panel.to_string()] } else { Vec::new() };
-            row.push(format!("`{}`", noise.design));
-            row.extend(noise.rmse.iter().map(|e| plain(*e)));
-            row.push(interval(noise.fall(), 1));
-            row
-        })
-        .collect();
-    text.push_str(&markdown_table(&header, &rows));
-    text.push('\n');
+    let all = panels.iter().flat_map(|(panel, list)| list.iter().map(move |noise| (panel, noise)));
+    let rows = all.map(|(panel, noise)| {
+        let mut row = if named { vec![panel.to_string()] } else { Vec::new() };
+        row.push(format!("`{}`", noise.design));
+        row.extend(noise.rmse.iter().map(|e| plain(*e)));
+        row.push(interval(noise.fall(), 1));
+        row
+    });
+    section.table(header, rows);
 }
 
 /// An estimate with its interval's ends.
@@ -55,7 +49,7 @@ fn interval(e: Estimate, decimals: usize) -> String {
 const DESIGNS: [&str; 2] = ["enderton", "lk"];
 
 /// Figure 1: dithering, edges, layers.
-pub(super) fn figure_1(p: &Publications) -> Against {
+fn figure_1(p: &Publications) -> Against {
     let noise = &p.noise;
     let falls = pair(&noise.dithering, DESIGNS).map(|pair| pair.map(Noise::fall));
     let edges = DESIGNS.map(|d| noise.edges.iter().find(|e| e.design == d));
@@ -96,26 +90,24 @@ pub(super) fn figure_1(p: &Publications) -> Against {
 }
 
 /// Figure 1's section.
-pub(super) fn figure_1_text(text: &mut String, p: &Publications, folder: &str) {
-    figure_1(p).open(text);
-    let _ = writeln!(
-        text,
+pub(super) fn figure_1_section(p: &Publications) -> Option<Section> {
+    let mut section = Section::answering(figure_1(p));
+    section.paragraph(format!(
         "RMSE in 8-bit units, after the picture and the exact one are averaged over blocks of \
          pixels; {} seeds. Noise without spatial stratification halves as the block's side \
-         doubles (8 in all), dithered noise falls faster.\n",
+         doubles (8 in all), dithered noise falls faster.",
         p.effort.seeds
-    );
+    ));
     blocks(
-        text,
+        &mut section,
         &[("ramps, 16 samples", &p.noise.dithering), ("cloth, 64 samples", &p.noise.cloth)],
     );
-    let _ = writeln!(text, "The lower part of the ramps, alpha 0.75 drawn as five quads:\n");
-    let row = |e: &EdgeNoise| vec![format!("`{}`", e.design), plain(e.edges), plain(e.inside)];
-    let rows: Vec<Vec<String>> = p.noise.edges.iter().map(row).collect();
+    section.paragraph("The lower part of the ramps, alpha 0.75 drawn as five quads:");
+    let row = |e: &EdgeNoise| [format!("`{}`", e.design), plain(e.edges), plain(e.inside)];
     let header = ["design", "where triangles meet", "elsewhere"];
-    text.push_str(&markdown_table(&header, &rows));
-    text.push('\n');
-    show(text, &p.pictures, folder, |file| ["figure-1", "figure-1-cloth"].contains(&file));
+    section.table(header, p.noise.edges.iter().map(row));
+    show(&mut section, &p.pictures, &["figure-1", "figure-1-cloth"]);
+    Some(section)
 }
 
 /// The reference values of figure 3a and 3b, fixed to samples as in section 3.
@@ -123,7 +115,7 @@ const FIXED: [&str; 2] =
     ["lk:sort=false,compact=false", "lk:reference=sobol,sort=false,compact=false"];
 
 /// Figure 3b: correlations that the Sobol' sequence leaves.
-pub(super) fn figure_3b(p: &Publications) -> Against {
+fn figure_3b(p: &Publications) -> Against {
     let falls = pair(&p.noise.correlation, FIXED).map(|pair| pair.map(Noise::fall));
     let left = pair(&p.noise.correlation, FIXED).map(|[hash, sobol]| {
         let last = BLOCKS.len() - 1;
@@ -155,21 +147,21 @@ pub(super) fn figure_3b(p: &Publications) -> Against {
 }
 
 /// Figure 3's section.
-pub(super) fn figure_3b_text(text: &mut String, p: &Publications, folder: &str) {
-    figure_3b(p).open(text);
-    let _ = writeln!(
-        text,
+pub(super) fn figure_3b_section(p: &Publications) -> Option<Section> {
+    let mut section = Section::answering(figure_3b(p));
+    section.paragraph(format!(
         "Eight white layers of alpha 0.1 at 8 samples; RMSE in 8-bit units after averaging over \
          blocks of pixels, {CORRELATION_SEEDS} seeds. `sort=false,compact=false` fixes reference \
          values to samples, as in section 3 of the paper. What is left over blocks of 8 × 8 pixels \
-         is common to many pixels of a frame; it changes from seed to seed.\n"
-    );
-    blocks(text, &[("", &p.noise.correlation)]);
-    show(text, &p.pictures, folder, |file| file == "figure-3");
+         is common to many pixels of a frame; it changes from seed to seed."
+    ));
+    blocks(&mut section, &[("", &p.noise.correlation)]);
+    show(&mut section, &p.pictures, &["figure-3"]);
+    Some(section)
 }
 
 /// Figure 5: samples left to a far surface.
-pub(super) fn figure_5(p: &Publications) -> Against {
+fn figure_5(p: &Publications) -> Against {
     let right = |f: &FarSamples| f.range == [4, 4];
     let parts = |part: &str| p.far_samples.iter().filter(|f| f.part == part).collect::<Vec<_>>();
     let exact = |part: &str| !parts(part).is_empty() && parts(part).iter().all(|f| right(f));
@@ -207,32 +199,27 @@ pub(super) fn figure_5(p: &Publications) -> Against {
 }
 
 /// Figure 5's section.
-pub(super) fn figure_5_text(text: &mut String, p: &Publications) {
-    figure_5(p).open(text);
-    let _ = writeln!(
-        text,
+pub(super) fn figure_5_section(p: &Publications) -> Option<Section> {
+    let mut section = Section::answering(figure_5(p));
+    section.paragraph(
         "Samples that a surface of alpha 0.5 keeps under another one of alpha 0.5, of 16: fewest \
-         and most over 64 × 64 pixels. The right number is 4.\n"
+         and most over 64 × 64 pixels. The right number is 4.",
     );
-    let rows: Vec<Vec<String>> = p
-        .far_samples
-        .iter()
-        .map(|f| {
-            let order = if f.near_first { "near to far" } else { "far to near" };
-            vec![
-                if f.part.is_empty() { String::new() } else { format!("({})", f.part) },
-                format!("`{}`", f.design),
-                order.to_string(),
-                format!("{} to {}", f.range[0], f.range[1]),
-            ]
-        })
-        .collect();
-    text.push_str(&markdown_table(&["part", "design", "drawn", "samples"], &rows));
-    text.push('\n');
+    let row = |f: &FarSamples| {
+        let order = if f.near_first { "near to far" } else { "far to near" };
+        [
+            if f.part.is_empty() { String::new() } else { format!("({})", f.part) },
+            format!("`{}`", f.design),
+            order.to_string(),
+            format!("{} to {}", f.range[0], f.range[1]),
+        ]
+    };
+    section.table(["part", "design", "drawn", "samples"], p.far_samples.iter().map(row));
+    Some(section)
 }
 
 /// Figure 6: the sort.
-pub(super) fn figure_6(p: &Publications) -> Against {
+fn figure_6(p: &Publications) -> Against {
     let found = pair(&p.noise.sorting, ["lk:sort=false", "lk"]);
     let gain = found.map(|[without, with]| without.rmse[0].ratio(with.rmse[0]));
     let noisier = gain.is_some_and(|gain| above(gain, 1.0));
@@ -258,14 +245,14 @@ pub(super) fn figure_6(p: &Publications) -> Against {
 }
 
 /// Figure 6's section.
-pub(super) fn figure_6_text(text: &mut String, p: &Publications, folder: &str) {
-    figure_6(p).open(text);
-    let _ = writeln!(
-        text,
+pub(super) fn figure_6_section(p: &Publications) -> Option<Section> {
+    let mut section = Section::answering(figure_6(p));
+    section.paragraph(format!(
         "A detail of `builtin:cloth` at 16 samples, triangles in random order, {} seeds: RMSE in \
-         8-bit units, also averaged over blocks of pixels.\n",
+         8-bit units, also averaged over blocks of pixels.",
         p.effort.seeds
-    );
-    blocks(text, &[("", &p.noise.sorting)]);
-    show(text, &p.pictures, folder, |file| file == "figure-6");
+    ));
+    blocks(&mut section, &[("", &p.noise.sorting)]);
+    show(&mut section, &p.pictures, &["figure-6"]);
+    Some(section)
 }

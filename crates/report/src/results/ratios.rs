@@ -1,8 +1,18 @@
 //! A ratio on every scene, and on which of them a rule holds: what a sentence about scenes
 //! is made of.
 
-use crate::results::against::{above, below};
+use crate::document::code;
 use screendoor_study::metrics::Estimate;
+
+/// Whether an estimate lies below a bound by more than its interval.
+pub(super) fn below(e: Estimate, bound: f64) -> bool {
+    e.high < bound
+}
+
+/// The same above it.
+pub(super) fn above(e: Estimate, bound: f64) -> bool {
+    e.low > bound
+}
 
 /// A number on each of several scenes.
 #[derive(Clone, Debug, Default)]
@@ -25,7 +35,8 @@ impl OnScenes {
         let by = |a: &&(String, Estimate), b: &&(String, Estimate)| a.1.value.total_cmp(&b.1.value);
         let ends = self.known().min_by(by).zip(self.known().max_by(by));
         ends.map_or("not measured".to_string(), |((low_name, low), (high_name, high))| {
-            format!("{:.2} (`{low_name}`) to {:.2} (`{high_name}`)", low.value, high.value)
+            let [low_name, high_name] = [low_name, high_name].map(|name| code(name));
+            format!("{:.2} ({low_name}) to {:.2} ({high_name})", low.value, high.value)
         })
     }
 
@@ -60,7 +71,7 @@ pub(super) fn holding<'a>(scenes: impl Iterator<Item = (&'a str, bool)>) -> Hold
     for (name, holds) in scenes {
         each.push(holds);
         if !holds {
-            but.push(format!("`{name}`"));
+            but.push(code(name));
         }
     }
     Holding { each, but }

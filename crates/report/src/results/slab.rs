@@ -1,10 +1,6 @@
 //! Wyman's claim for SLAB.
 
-use std::fmt::Write;
-
-use crate::markdown_table;
-use crate::results::against::{Against, Agreement};
-use crate::results::dial;
+use crate::document::{Against, Agreement, Section};
 use screendoor_study::study::comparison::{
     Comparison, Contender, SLAB_CLAIM, SLAB_LAYERS, SLAB_LIMIT, SLAB_RIVALS,
 };
@@ -72,7 +68,7 @@ fn range(values: impl Iterator<Item = usize> + Clone) -> String {
 }
 
 /// The claim beside what is measured.
-pub(super) fn against(c: &Comparison) -> Against {
+fn against(c: &Comparison) -> Against {
     let duels = duels(c);
     let won = |antialiased: bool| {
         range(duels.iter().filter(|d| d.antialiased == antialiased).map(|d| d.won(CLAIMED)))
@@ -113,52 +109,43 @@ pub(super) fn against(c: &Comparison) -> Against {
 }
 
 /// The section.
-pub(super) fn text(c: &Comparison, folder: &str) -> String {
-    let mut text = String::new();
-    against(c).open(&mut text);
-    let _ = writeln!(
-        text,
+pub(super) fn section(c: &Comparison) -> Section {
+    let mut section = Section::answering(against(c));
+    section.paragraph(format!(
         "On how many of {} scenes `slab` with {SLAB_LAYERS} layers has a smaller RMSE than `enderton` \
          with the same normalisation at {} samples, {} × {} pixels, {} seeds: with antialiasing, \
          where each of the pieces of a surface that share a pixel takes a layer, and without, all \
-         samples at the pixel's centre.\n",
+         samples at the pixel's centre.",
         c.scenes.len(),
         SLAB_RIVALS.map(|n| n.to_string()).join(", "),
         c.side,
         c.side,
         c.seeds
-    );
-    let rows: Vec<Vec<String>> = duels(c)
-        .iter()
-        .map(|duel| {
-            let antialiasing = if duel.antialiased { "with" } else { "without" };
-            let names = [duel.slab, duel.rival].map(|name| format!("`{name}`"));
-            let mut row = vec![antialiasing.to_string()];
-            row.extend(names);
-            row.extend(SLAB_RIVALS.map(|count| duel.won(count).to_string()));
-            row.push(duel.verdict());
-            row.push(duel.state().map(|s| format!("{s:.1}")).unwrap_or_default());
-            row
-        })
-        .collect();
-    let counts = SLAB_RIVALS.map(|n| n.to_string());
-    let better = format!("better than {CLAIMED}");
-    let mut header = vec!["antialiasing", "design", "against"];
-    header.extend(counts.iter().map(String::as_str));
-    header.extend([better.as_str(), "state ÷ that of 8 samples"]);
-    text.push_str(&markdown_table(&header, &rows));
-    errors(&mut text, c);
-    dial::text(&mut text, &c.dial, folder);
-    text
+    ));
+    let row = |duel: Duel<'_>| {
+        let antialiasing = if duel.antialiased { "with" } else { "without" };
+        let names = [duel.slab, duel.rival].map(|name| format!("`{name}`"));
+        let mut row = vec![antialiasing.to_string()];
+        row.extend(names);
+        row.extend(SLAB_RIVALS.map(|count| duel.won(count).to_string()));
+        row.push(duel.verdict());
+        row.push(duel.state().map(|s| format!("{s:.1}")).unwrap_or_default());
+        row
+    };
+    let mut header = ["antialiasing", "design", "against"].map(str::to_string).to_vec();
+    header.extend(SLAB_RIVALS.map(|n| n.to_string()));
+    header.extend([format!("better than {CLAIMED}"), "state ÷ that of 8 samples".to_string()]);
+    section.table(header, duels(c).into_iter().map(row));
+    errors(&mut section, c);
+    section
 }
 
 /// The errors that the claim rests on.
-fn errors(text: &mut String, c: &Comparison) {
-    let _ = writeln!(
-        text,
-        "\nThe errors, without antialiasing (bytes of state per pixel in brackets; `{SLAB_LIMIT}` is \
-         what `slab` becomes with ever more bits):\n"
-    );
+fn errors(section: &mut Section, c: &Comparison) {
+    section.paragraph(format!(
+        "The errors, without antialiasing (bytes of state per pixel in brackets; `{SLAB_LIMIT}` is \
+         what `slab` becomes with ever more bits):"
+    ));
     let columns = [
         ("slab", SLAB_LAYERS),
         ("enderton:method=depth-correction", 8),
@@ -168,24 +155,18 @@ fn errors(text: &mut String, c: &Comparison) {
         ("enderton", CLAIMED),
         (SLAB_LIMIT, SLAB_LAYERS),
     ];
-    let rows: Vec<Vec<String>> = c
-        .without_antialiasing
-        .iter()
-        .map(|scene| {
-            let layers = scene.statistics.depth_complexity.mean;
-            let mut row = vec![scene.name.clone(), format!("{layers:.1}")];
-            row.extend(columns.iter().map(|(label, count)| {
-                let found = c.contender(label).and_then(|i| scene.record(&i.series, *count));
-                found.map_or("—".to_string(), cell)
-            }));
-            row
-        })
-        .collect();
-    let names: Vec<String> = columns.iter().map(|(l, n)| format!("`{l}`, {n}")).collect();
-    let mut header = vec!["scene", "layers"];
-    header.extend(names.iter().map(String::as_str));
-    text.push_str(&markdown_table(&header, &rows));
-    text.push('\n');
+    let row = |scene: &MeasuredScene| {
+        let layers = scene.statistics.depth_complexity.mean;
+        let mut row = vec![scene.name.clone(), format!("{layers:.1}")];
+        row.extend(columns.iter().map(|(label, count)| {
+            let found = c.contender(label).and_then(|i| scene.record(&i.series, *count));
+            found.map_or("—".to_string(), cell)
+        }));
+        row
+    };
+    let mut header = vec!["scene".to_string(), "layers".to_string()];
+    header.extend(columns.map(|(label, n)| format!("`{label}`, {n}")));
+    section.table(header, c.without_antialiasing.iter().map(row));
 }
 
 /// An error with its interval, where there is one, and the state.

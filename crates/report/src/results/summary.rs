@@ -1,28 +1,19 @@
 //! The results in short: a line for each claim, which RESULTS.md holds in its parts and
 //! README.md repeats.
 
-use std::fmt::Write;
-
-use crate::results::Against;
+use crate::document::{List, Text};
 use screendoor_trace::error::{Error, Result};
 
 /// The marks around what is in short, in RESULTS.md's parts and in README.md.
 const BEGIN: &str = "<!-- begin of the results in short, written by `screendoor reproduce` -->\n";
 const END: &str = "<!-- end of the results in short -->\n";
 
-/// A part in short: every claim with its verdict and what was measured, then other lines.
-pub(super) fn of(against: &[Against], others: &[String]) -> String {
-    let mut text = BEGIN.to_string();
-    for a in against {
-        let Against { section, source, measured, agreement, .. } = a;
-        let verdict = agreement.word();
-        let _ = writeln!(text, "- **{section}** ({source}): {verdict}. {measured}");
+/// A part in short, where it has anything to tell.
+pub(super) fn of(items: Vec<Text>) -> String {
+    match items.is_empty() {
+        true => String::new(),
+        false => format!("{BEGIN}{}{END}", List { first: None, items }.to_markdown()),
     }
-    for line in others {
-        let _ = writeln!(text, "- {line}");
-    }
-    text.push_str(END);
-    text
 }
 
 /// What lies between the marks, where they are.
@@ -75,24 +66,25 @@ pub fn in_short(document: &str, results: &str) -> Result<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::results::Agreement;
+    use crate::document::{Against, Agreement};
 
-    fn against(section: &str, measured: &str, agreement: Agreement) -> Against {
+    fn against(section: &str, measured: &str, agreement: Agreement) -> Text {
         let text = |t: &str| t.to_string();
-        Against {
+        let against = Against {
             section: text(section),
             source: text("A 2000, section 1"),
             printed: text("So."),
             measured: text(measured),
             agreement,
             remark: text("Hm."),
-        }
+        };
+        against.in_short()
     }
 
     #[test]
     fn a_document_repeats_every_line_of_every_part() {
-        let lk = of(&[against("One", "0.99 to 1.09.", Agreement::InPart)], &[]);
-        let others = of(&[against("Two", "6.5.", Agreement::Differs)], &["**Three**: 3.".into()]);
+        let lk = of(vec![against("One", "0.99 to 1.09.", Agreement::InPart)]);
+        let others = of(vec![against("Two", "6.5.", Agreement::Differs), "**Three**: 3.".into()]);
         let results = format!("# Results\n{lk}## One\ntext\n{others}## Two\n");
         let document = format!("# It\n\n{BEGIN}old\n{END}\nmore\n");
         let written = in_short(&document, &results).unwrap();
@@ -107,7 +99,7 @@ mod tests {
 
     #[test]
     fn marks_and_results_that_are_missing_are_named() {
-        let results = of(&[against("One", "1.", Agreement::Confirmed)], &[]);
+        let results = of(vec![against("One", "1.", Agreement::Confirmed)]);
         let error = in_short("# It\n", &results).unwrap_err().to_string();
         assert!(error.contains("begin of the results in short"), "{error}");
         assert!(check_marks("# It\n").is_err() && check_marks(&results).is_ok());

@@ -1,17 +1,14 @@
 //! LK table 1.
 
-use std::fmt::Write;
-
-use crate::markdown_table;
-use crate::results::against::{Against, Agreement, above, below};
-use crate::results::ratios::OnScenes;
-use crate::results::{plain, ratio};
+use crate::document::{Against, Agreement, Section, code};
+use crate::results::ratios::{OnScenes, above, below};
+use crate::results::{account, plain, ratio};
 use screendoor_study::metrics::Estimate;
 use screendoor_study::study::publications::{COUNTS, DESIGNS, Publications, Published, Table1};
 use screendoor_study::study::record::Record;
 
 /// The table beside the paper's.
-pub(super) fn against(p: &Publications) -> Against {
+fn against(p: &Publications) -> Against {
     let [motor, cloth] = [Published::Motor, Published::Cloth].map(|column| {
         let [first, .., last] = column.rmse().map(|[lk, comparison]| lk / comparison);
         format!("{first:.2} to {last:.2}")
@@ -26,8 +23,12 @@ pub(super) fn against(p: &Publications) -> Against {
         .filter_map(|(table, ratios)| {
             let ((_, e, naive), (_, last_e, last_naive)) = (ratios.first()?, ratios.last()?);
             Some(format!(
-                "on `{}` {:.2} to {:.2} against `enderton`, {:.2} to {:.2} against `naive`",
-                table.scene.name, e.value, last_e.value, naive.value, last_naive.value
+                "on {} {:.2} to {:.2} against `enderton`, {:.2} to {:.2} against `naive`",
+                code(&table.scene.name),
+                e.value,
+                last_e.value,
+                naive.value,
+                last_naive.value
             ))
         })
         .collect();
@@ -103,7 +104,7 @@ fn close(ratio: Estimate) -> bool {
 }
 
 /// LK's 16 samples beside 64 of the comparison's.
-pub(super) fn fewer_samples(p: &Publications) -> Against {
+fn fewer_samples(p: &Publications) -> Against {
     let [to_enderton, to_naive] = [1, 2].map(|other| few_to_many(p, other));
     let [motor, cloth] = printed_few_to_many();
     let holds = [&to_enderton, &to_naive].map(|list| list.holding(close));
@@ -131,18 +132,17 @@ pub(super) fn fewer_samples(p: &Publications) -> Against {
     }
 }
 
-/// The section.
-pub(super) fn fewer_samples_text(text: &mut String, p: &Publications) {
-    fewer_samples(p).open(text);
-    let _ = writeln!(
-        text,
-        "RMSE as in the table above, {} × {} pixels, {} seeds.\n",
+/// The section on that, with the account of where table 1 differs.
+pub(super) fn fewer_samples_section(p: &Publications) -> Option<Section> {
+    let mut section = Section::answering(fewer_samples(p));
+    section.paragraph(format!(
+        "RMSE as in the table above, {} × {} pixels, {} seeds.",
         p.effort.side, p.effort.side, p.effort.seeds
-    );
+    ));
     let row = |table: &Table1| {
         let lk = runs(table, FEW)[0].fine;
         let [_, e, naive] = runs(table, MANY).map(|r| r.fine);
-        vec![
+        [
             table.scene.name.to_string(),
             plain(lk),
             plain(e),
@@ -151,7 +151,6 @@ pub(super) fn fewer_samples_text(text: &mut String, p: &Publications) {
             ratio(lk, naive),
         ]
     };
-    let rows: Vec<Vec<String>> = p.table_1.iter().map(row).collect();
     let named = |design: &str, n: u32| format!("`{design}`, {n}");
     let header = [
         "scene".to_string(),
@@ -161,65 +160,61 @@ pub(super) fn fewer_samples_text(text: &mut String, p: &Publications) {
         "lk ÷ enderton".to_string(),
         "lk ÷ naive".to_string(),
     ];
-    let header: Vec<&str> = header.iter().map(String::as_str).collect();
-    text.push_str(&markdown_table(&header, &rows));
-    text.push('\n');
+    section.table(header, p.table_1.iter().map(row));
+    section.parts.push(account::part(p));
+    Some(section)
 }
 
 /// The table's section, without the account of where it differs.
-pub(super) fn text(text: &mut String, p: &Publications) {
-    against(p).open(text);
-    let _ = writeln!(
-        text,
+pub(super) fn section(p: &Publications) -> Option<Section> {
+    let mut section = Section::answering(against(p));
+    section.paragraph(format!(
         "RMSE over the covered pixels against the exact picture of all 64 samples, so that \
          missing antialiasing counts as it does against the paper's reference of thousands of \
          samples; {} × {} pixels, {} seeds. `naive` is `enderton:mask=naive`, which tests every \
-         sample on its own. The paper's models are not public: ours stand in for them.\n",
+         sample on its own. The paper's models are not public: ours stand in for them.",
         p.effort.side, p.effort.side, p.effort.seeds
-    );
-    for (i, table) in p.table_1.iter().enumerate() {
-        table_1(text, i, table);
-    }
+    ));
+    section.parts = p.table_1.iter().enumerate().map(|(i, table)| table_1(i, table)).collect();
     for missing in &p.missing {
-        let _ = writeln!(text, "`{missing}`: the model was not given, so there is no table.\n");
+        let missing = code(missing);
+        section
+            .end()
+            .paragraph(format!("{missing}: the model was not given, so there is no table."));
     }
+    Some(section)
 }
 
-fn table_1(text: &mut String, index: usize, table: &Table1) {
+fn table_1(index: usize, table: &Table1) -> Section {
     let s = &table.scene.statistics;
     let paper = match table.stands_for {
         Published::Motor => "MOTOR",
         Published::Cloth => "CLOTH",
     };
-    let _ = writeln!(
-        text,
-        "### `{}`, beside {paper}\n\n{}. {:.2} million fragments, {:.1} per covered pixel (95 % of them have \
-         at most {}), an edge in {:.0} % of the covered pixels.\n",
-        table.scene.name,
+    let mut part = Section::new(format!("{}, beside {paper}", code(&table.scene.name)));
+    part.paragraph(format!(
+        "{}. {:.2} million fragments, {:.1} per covered pixel (95 % of them have \
+         at most {}), an edge in {:.0} % of the covered pixels.",
         table.origin,
         s.fragments as f64 / 1e6,
         s.depth_complexity.mean,
         s.depth_complexity.p95,
         100.0 * (1.0 - s.interior_pixels as f64 / s.covered_pixels.max(1) as f64),
-    );
-    let rows: Vec<Vec<String>> = COUNTS
-        .iter()
-        .zip(table.stands_for.rmse())
-        .map(|(n, [paper_lk, paper_e])| {
-            let [lk, e, naive] = runs(table, *n).map(|r| r.fine);
-            vec![
-                n.to_string(),
-                plain(lk),
-                plain(e),
-                plain(naive),
-                ratio(lk, e),
-                ratio(lk, naive),
-                format!("{paper_lk}"),
-                format!("{paper_e}"),
-                format!("{:.2}", paper_lk / paper_e),
-            ]
-        })
-        .collect();
+    ));
+    let rows = COUNTS.iter().zip(table.stands_for.rmse()).map(|(n, [paper_lk, paper_e])| {
+        let [lk, e, naive] = runs(table, *n).map(|r| r.fine);
+        [
+            n.to_string(),
+            plain(lk),
+            plain(e),
+            plain(naive),
+            ratio(lk, e),
+            ratio(lk, naive),
+            format!("{paper_lk}"),
+            format!("{paper_e}"),
+            format!("{:.2}", paper_lk / paper_e),
+        ]
+    });
     let header = [
         "samples",
         "lk",
@@ -231,33 +226,28 @@ fn table_1(text: &mut String, index: usize, table: &Table1) {
         "paper comp.",
         "paper ratio",
     ];
-    text.push_str(&markdown_table(&header, &rows));
-
-    let _ = writeln!(
-        text,
-        "\nThe same against the exact picture of the same samples (noise alone), with and without \
-         the pixels that an edge crosses:\n"
+    part.table(header, rows);
+    part.paragraph(
+        "The same against the exact picture of the same samples (noise alone), with and without \
+         the pixels that an edge crosses:",
     );
-    let rows: Vec<Vec<String>> = COUNTS
-        .iter()
-        .map(|n| {
-            let [lk, e, naive] = runs(table, *n);
-            let mut row = vec![n.to_string(), plain(lk.covered.rmse), plain(e.covered.rmse)];
-            row.push(plain_srgb(lk));
-            row.push(plain_srgb(e));
-            let regions =
-                [(&lk.covered, &e.covered), (&lk.interior, &e.interior), (&lk.edges, &e.edges)];
-            row.extend(regions.map(|(lk, e)| {
-                if lk.pixels < LEAST_PIXELS {
-                    format!("— ({} pixels)", lk.pixels)
-                } else {
-                    ratio(lk.rmse, e.rmse)
-                }
-            }));
-            row.push(ratio(lk.edges.rmse, naive.edges.rmse));
-            row
-        })
-        .collect();
+    let rows = COUNTS.iter().map(|n| {
+        let [lk, e, naive] = runs(table, *n);
+        let mut row = vec![n.to_string(), plain(lk.covered.rmse), plain(e.covered.rmse)];
+        row.push(plain_srgb(lk));
+        row.push(plain_srgb(e));
+        let regions =
+            [(&lk.covered, &e.covered), (&lk.interior, &e.interior), (&lk.edges, &e.edges)];
+        row.extend(regions.map(|(lk, e)| {
+            if lk.pixels < LEAST_PIXELS {
+                format!("— ({} pixels)", lk.pixels)
+            } else {
+                ratio(lk.rmse, e.rmse)
+            }
+        }));
+        row.push(ratio(lk.edges.rmse, naive.edges.rmse));
+        row
+    });
     let header = [
         "samples",
         "lk",
@@ -269,14 +259,13 @@ fn table_1(text: &mut String, index: usize, table: &Table1) {
         "… edges alone",
         "lk ÷ naive, edges",
     ];
-    text.push_str(&markdown_table(&header, &rows));
+    part.table(header, rows);
     if index == 0 {
-        let _ = writeln!(
-            text,
-            "\n(RMSE on sRGB-encoded values are those of the numbers that an 8-bit display is sent.)"
+        part.paragraph(
+            "(RMSE on sRGB-encoded values are those of the numbers that an 8-bit display is sent.)",
         );
     }
-    text.push('\n');
+    part
 }
 
 /// Regions with fewer pixels say nothing.

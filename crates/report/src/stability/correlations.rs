@@ -1,54 +1,47 @@
 //! Correlations between surfaces, seeds and pixels.
 
-use std::fmt::Write;
-
-use crate::markdown_table;
+use crate::document::Section;
 use screendoor_study::study::stress::{
     Between, Correlation, CorrelationRow, SIGNIFICANCE, Stability,
 };
 
-pub(super) fn text(text: &mut String, found: &Stability) {
+pub(super) fn section(found: &Stability) -> Section {
     let promised = found.hashes.iter().filter(|h| h.promised);
     let promised: Vec<String> = promised.map(|h| format!("`{}`", h.name)).collect();
-    let _ = writeln!(
-        text,
-        "## Correlations\n\n\
-         Pearson's coefficient between the reference values of two surfaces, two seeds and two \
+    let mut section = Section::new("Correlations");
+    section.paragraph(format!(
+        "Pearson's coefficient between the reference values of two surfaces, two seeds and two \
          neighbouring pixels, the same sample of both: over the pixels of an image, and within single \
          pixels over their surfaces or seeds; the largest over several distances and pixels. In bold \
          what chance alone gives anywhere in the table with a probability below {SIGNIFICANCE} \
          (Bonferroni). Pixels that follow each other on the curve share their strata, which is what \
          LK section 3.1 wants: there a correlation is meant. That surfaces and seeds are unrelated is \
-         promised of: {}.\n",
+         promised of: {}.",
         promised.join(", ")
-    );
+    ));
     let columns: Vec<(Between, bool)> =
         Between::ALL.into_iter().flat_map(|b| [(b, true), (b, false)]).collect();
-    table(text, "hash", &found.hashes, &columns);
-    text.push_str(
+    table(&mut section, "hash", &found.hashes, &columns);
+    section.paragraph(
         "The same of the pictures of designs that are random, one layer of alpha 0.3 at 8 samples: \
          drawn as the pixels' second and as their third surface, with two seeds, and pixels that lie \
-         beside each other (— where pictures have no noise).\n\n",
+         beside each other (— where pictures have no noise).",
     );
-    table(text, "design", &found.pictures, &Between::ALL.map(|b| (b, true)));
+    table(&mut section, "design", &found.pictures, &Between::ALL.map(|b| (b, true)));
+    section
 }
 
-fn table(text: &mut String, what: &str, rows: &[CorrelationRow], columns: &[(Between, bool)]) {
-    let head: Vec<String> = columns
-        .iter()
-        .map(|(between, image)| {
-            let over = if *image { "over an image" } else { "in a pixel" };
-            format!("{}, {over}", between.words())
-        })
-        .collect();
-    let head: Vec<&str> = std::iter::once(what).chain(head.iter().map(String::as_str)).collect();
-    let row = |row: &CorrelationRow| {
+fn table(section: &mut Section, what: &str, rows: &[CorrelationRow], columns: &[(Between, bool)]) {
+    let names = columns.iter().map(|(between, image)| {
+        let over = if *image { "over an image" } else { "in a pixel" };
+        format!("{}, {over}", between.words())
+    });
+    let rows = rows.iter().map(|row| {
         let cells =
             columns.iter().map(|(b, image)| row.get(*b, *image).map_or(String::new(), cell));
-        std::iter::once(format!("`{}`", row.name)).chain(cells).collect()
-    };
-    text.push_str(&markdown_table(&head, &rows.iter().map(row).collect::<Vec<_>>()));
-    text.push('\n');
+        std::iter::once(format!("`{}`", row.name)).chain(cells)
+    });
+    section.table(std::iter::once(what.to_string()).chain(names), rows);
 }
 
 fn cell(c: &Correlation) -> String {

@@ -1,11 +1,8 @@
 //! What fuzzing found.
 
-use std::fmt::Write;
-
 use serde::Deserialize;
 
-use crate::markdown_table;
-use crate::stability::in_cell;
+use crate::document::Section;
 use screendoor_trace::error::{Error, Result};
 
 const FIGURES: &str = include_str!("../../../../docs/fuzzing/figures.toml");
@@ -53,41 +50,29 @@ fn parsed<'a, T: Deserialize<'a>>(text: &'a str, name: &str) -> Result<T> {
 
 /// # Errors
 /// [`Error::Invalid`] where the figures of the tree are damaged.
-pub(super) fn text(text: &mut String) -> Result<()> {
+pub(super) fn section() -> Result<Section> {
     let figures: Figures = parsed(FIGURES, "figures.toml")?;
     let findings: Findings = parsed(FOUND, "found.toml")?;
     let executions: u64 = figures.target.iter().map(|t| t.executions).sum();
     let failures: u64 = figures.target.iter().map(|t| t.failures).sum();
-    let _ = writeln!(
-        text,
-        "## Fuzzing\n\n\
-         Coverage-guided, libFuzzer through cargo-fuzz: `fuzz/run.sh` builds the targets of `fuzz/`, \
+    let mut section = Section::new("Fuzzing");
+    section.paragraph(format!(
+        "Coverage-guided, libFuzzer through cargo-fuzz: `fuzz/run.sh` builds the targets of `fuzz/`, \
          runs them and writes the figures. {:.1} million executions in all, {failures} failures left. \
          A failure is a panic, an arithmetic overflow, an error of more than one line, a picture that \
          is not finite, an allocation of more than 256 MiB, 5 s without an answer. What is kept of \
-         the corpus (`fuzz/seeds`) is taken by the same functions in every `cargo test`.\n",
+         the corpus (`fuzz/seeds`) is taken by the same functions in every `cargo test`.",
         executions as f64 / 1e6
-    );
-    let rows: Vec<Vec<String>> = figures
-        .target
-        .iter()
-        .map(|t| {
-            let numbers = [t.executions, t.seconds, t.covered, t.corpus, t.failures];
-            std::iter::once(format!("`{}`", t.name)).chain(numbers.map(|n| n.to_string())).collect()
-        })
-        .collect();
+    ));
+    let row = |t: &Target| {
+        let numbers = [t.executions, t.seconds, t.covered, t.corpus, t.failures];
+        std::iter::once(format!("`{}`", t.name)).chain(numbers.map(|n| n.to_string()))
+    };
     let head =
         ["target", "executions", "seconds", "edges covered", "inputs that cover more", "failures"];
-    text.push_str(&markdown_table(&head, &rows));
-    text.push_str("\nFound, mended and kept:\n\n");
-    let rows: Vec<Vec<String>> = findings
-        .found
-        .iter()
-        .map(|f| {
-            vec![format!("`{}`", f.target), in_cell(&f.what), in_cell(&f.mended), f.kept.clone()]
-        })
-        .collect();
-    text.push_str(&markdown_table(&["target", "what", "mended", "kept"], &rows));
-    text.push('\n');
-    Ok(())
+    section.table(head, figures.target.iter().map(row));
+    section.paragraph("Found, mended and kept:");
+    let row = |f: Finding| [format!("`{}`", f.target), f.what, f.mended, f.kept];
+    section.table(["target", "what", "mended", "kept"], findings.found.into_iter().map(row));
+    Ok(section)
 }

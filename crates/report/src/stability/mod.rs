@@ -5,8 +5,7 @@ mod correlations;
 mod fuzzing;
 mod system;
 
-use std::fmt::Write;
-
+use crate::document::Section;
 use screendoor_study::study::stress::Stability;
 use screendoor_trace::error::Result;
 
@@ -14,38 +13,35 @@ use screendoor_trace::error::Result;
 ///
 /// # Errors
 /// [`Error::Invalid`](screendoor_trace::error::Error::Invalid) where the figures of fuzzing are damaged.
-pub fn stability(found: &Stability, command: &str) -> Result<String> {
-    let mut text = "# Stability\n\n".to_string();
+pub fn stability(found: &Stability, command: &str) -> Result<Section> {
+    let mut document = Section::new("Stability");
     let broken = found.broken();
-    let _ = write!(text, "Written by `{command}`, figures within sentences too. ");
-    match &broken[..] {
-        [] => text.push_str("Everything below keeps what is promised of it.\n\n"),
-        list => {
-            let _ = writeln!(text, "**{} promises are broken:**\n", list.len());
-            list.iter().for_each(|b| text.push_str(&format!("- {b}\n")));
-            text.push('\n');
-        }
+    let verdict = match broken.len() {
+        0 => "Everything below keeps what is promised of it.".to_string(),
+        n => format!("**{n} promises are broken:**"),
+    };
+    document.paragraph(format!("Written by `{command}`, figures within sentences too. {verdict}"));
+    if !broken.is_empty() {
+        document.list(broken);
     }
-    text.push_str(&sections(found));
+    document.parts = sections(found);
     if !found.faults.is_empty() {
-        fuzzing::text(&mut text)?;
+        document.parts.push(fuzzing::section()?);
     }
-    Ok(text)
+    Ok(document)
 }
 
-/// Its sections, each under a heading `##`.
-pub(crate) fn sections(found: &Stability) -> String {
-    let mut text = String::new();
-    cases::text(&mut text, found);
-    cases::unfit(&mut text, found);
-    correlations::text(&mut text, found);
+/// Its sections.
+pub(crate) fn sections(found: &Stability) -> Vec<Section> {
+    let mut sections =
+        vec![cases::section(found), cases::unfit(found), correlations::section(found)];
     if !found.claims.is_empty() {
-        system::claims(&mut text, found);
+        sections.push(system::claims(found));
     }
     if !found.faults.is_empty() {
-        system::faults(&mut text, found);
+        sections.push(system::faults(found));
     }
-    text
+    sections
 }
 
 /// A number in three digits.
@@ -62,11 +58,6 @@ fn short(value: f64) -> String {
         true => text.trim_end_matches('0').trim_end_matches('.').to_string(),
         false => text,
     }
-}
-
-/// Text within a cell of a table.
-fn in_cell(text: &str) -> String {
-    text.replace('|', "\\|")
 }
 
 #[cfg(test)]
@@ -129,11 +120,12 @@ mod tests {
             (Outcome::Undecided { error: 0.1, bound: 0.2, noise }, "| `lk` | ± 0.25 ? |"),
             (Outcome::Refused { message: "too much".into() }, "| `lk` | refused (1) |"),
         ] {
-            let text = stability(&made_up(outcome, None), "c").unwrap();
+            let text = stability(&made_up(outcome, None), "c").unwrap().to_markdown(1, ".");
             assert!(text.contains(cell), "{text}");
             assert!(text.contains("keeps what is promised") && text.contains("a\\|fault"));
         }
         let text = stability(&made_up(Outcome::Exact, Some("it lies")), "c").unwrap();
+        let text = text.to_markdown(1, ".");
         assert!(
             text.contains("**1 promises are broken:**\n\n- lk on 'alpha 0': it lies"),
             "{text}"

@@ -131,7 +131,7 @@ fn bring(into: &Store, part: &Store) -> Result<()> {
     let mut files: Vec<PathBuf> =
         entries.map(|e| e.path()).filter(|p| p.is_file() && !is_partial(p)).collect();
     // Documents last: where they are, all that belongs to them is.
-    files.sort_by_key(|p| p.extension().is_some_and(|e| e == "md"));
+    files.sort_by_key(|p| p.extension().is_some_and(|e| e == "json"));
     files.iter().try_for_each(|path| copy(path))?;
     for job in part.jobs() {
         if part.record_file(&job.id).exists() {

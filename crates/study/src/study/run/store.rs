@@ -177,14 +177,14 @@ impl Store {
         self.verification_file(publication.name())
     }
 
-    /// A publication's document, written last of what belongs to it.
+    /// A publication's document as sections, written last of what belongs to it.
     pub fn document_file(&self, publication: Publication) -> PathBuf {
-        self.verification_file(&format!("{}.md", publication.name()))
+        self.verification_file(&format!("{}.sections.json", publication.name()))
     }
 
-    /// A publication's figures as JSON.
-    pub fn against_file(&self, publication: Publication) -> PathBuf {
-        self.verification_file(&format!("{}.json", publication.name()))
+    /// The same for people.
+    pub fn markdown_file(&self, publication: Publication) -> PathBuf {
+        self.verification_file(&format!("{}.md", publication.name()))
     }
 
     /// A scene's facts, where its trace has been there.

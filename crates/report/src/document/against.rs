@@ -1,15 +1,13 @@
 //! What publications print or say, each beside what is measured here, with a verdict.
 
-use std::fmt::Write;
-
 use serde::{Deserialize, Serialize};
 
-use screendoor_study::metrics::Estimate;
+use crate::document::Text;
 
 /// One thing that a publication prints or says, beside what is measured here.
 ///
-/// Each has its own section in a [`Document`](super::Document), under the heading
-/// [`Against::section`]. Serialises to JSON, so that it can be stored beside the document.
+/// Each has its own [`Section`](super::Section), whose heading is [`Against::section`]. Its texts
+/// are lines of CommonMark.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub struct Against {
     /// The section's heading.
@@ -59,38 +57,20 @@ impl Agreement {
 }
 
 impl Against {
-    /// Opens the section: its heading, what is printed, what is measured, the verdict.
-    pub(super) fn open(&self, text: &mut String) {
-        let Against { section, source, printed, measured, remark, .. } = self;
+    /// What is printed, what is measured, the verdict: a paragraph each.
+    pub fn paragraphs(&self) -> [Text; 3] {
+        let Against { source, printed, measured, remark, .. } = self;
         let verdict = self.agreement.word();
-        let _ = writeln!(
-            text,
-            "## {section}\n\n\
-             **Printed** ({source}): {printed}\n\n\
-             **Measured**: {measured}\n\n\
-             **Verdict**: {verdict}. {remark}\n"
-        );
+        [
+            format!("**Printed** ({source}): {printed}").into(),
+            format!("**Measured**: {measured}").into(),
+            format!("**Verdict**: {verdict}. {remark}").into(),
+        ]
     }
-}
 
-/// Whether an estimate lies below a bound by more than its interval.
-pub(super) fn below(e: Estimate, bound: f64) -> bool {
-    e.high < bound
-}
-
-/// The same above it.
-pub(super) fn above(e: Estimate, bound: f64) -> bool {
-    e.low > bound
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn statements_agree_wholly_in_part_or_not() {
-        assert_eq!(Agreement::of(&[true, true]), Agreement::Confirmed);
-        assert_eq!(Agreement::of(&[true, false]), Agreement::InPart);
-        assert_eq!(Agreement::of(&[false, false]), Agreement::Differs);
+    /// The verdict and what was measured, in a line.
+    pub fn in_short(&self) -> Text {
+        let Against { section, source, measured, agreement, .. } = self;
+        format!("**{section}** ({source}): {}. {measured}", agreement.word()).into()
     }
 }
