@@ -46,10 +46,10 @@ fn scene() -> Scene {
     scene
 }
 
-fn capture(scene: &Scene, camera: CameraOptions) -> Trace {
+fn capture(scene: &Scene, side: u32, camera: CameraOptions) -> Trace {
     let options = CaptureOptions {
-        width: SIDE,
-        height: SIDE,
+        width: side,
+        height: side,
         samples: 8,
         faces: Faces::Both,
         camera,
@@ -69,7 +69,7 @@ fn view_depth_is_the_distance_of_known_points() {
     let [a, b, c] = corners();
     let mut kinds = [0, 0];
     for camera in cameras() {
-        let trace = capture(&scene, camera);
+        let trace = capture(&scene, SIDE, camera);
         let view = trace.header().view.unwrap();
         kinds[view.projection as usize] += 1;
         let fragments: Vec<Fragment> =
@@ -115,7 +115,7 @@ fn spelt_out(view: &View) -> String {
 fn the_camera_s_lens_is_its_planes_spelt_out() {
     let scene = screendoor::scene::load("builtin:glass").unwrap();
     for field_of_view in [Some(0.0), Some(50.0)] {
-        let trace = capture(&scene, CameraOptions { field_of_view, ..Default::default() });
+        let trace = capture(&scene, 64, CameraOptions { field_of_view, ..Default::default() });
         let said = spelt_out(&trace.header().view.unwrap());
         for name in ["wboit", "mboit"] {
             let hash = |settings: &str| {
@@ -134,7 +134,7 @@ fn a_gpu_takes_view_depths_from_the_camera_too() {
     let Some(gpu) = gpu() else { return };
     let scene = screendoor::scene::load("builtin:glass").unwrap();
     for field_of_view in [Some(0.0), Some(50.0)] {
-        let trace = capture(&scene, CameraOptions { field_of_view, ..Default::default() });
+        let trace = capture(&scene, 64, CameraOptions { field_of_view, ..Default::default() });
         for spec in ["wboit:lens=camera,colour=32", "wboit:lens=camera,weight=eq8,colour=32"] {
             let design = design(spec);
             let options = GpuOptions::default();

@@ -294,7 +294,7 @@ mod check {
         bad(row, "the colour is not finite", hint)
     }
 
-    #[cfg(test)]
+    #[cfg(any(test, feature = "probe"))]
     pub fn finite(column: &Column<f32>, _: &Header) -> Option<Bad> {
         bad(first(column.stored(), |v| !v.is_finite()), "a number is not finite", "write numbers")
     }
