@@ -257,7 +257,7 @@ fn evenly<S: Simd, L: Lanes<S>>(simd: S, loaded: &Loaded<L>, start: u32, limit: 
 /// [`Evenly`] with the parameters that it has by default, known when the kernel is
 /// compiled.
 #[derive(Clone, Copy, Debug)]
-pub struct Summed;
+pub(crate) struct Summed;
 
 impl<const N: usize> FastReferences<N> for Summed {
     type Plain = Evenly;

@@ -58,7 +58,7 @@ impl Scratch {
     ///
     /// # Errors
     /// As [`Gpu::buffer`].
-    pub fn new(gpu: &Gpu, rows: usize) -> Result<Self> {
+    pub(crate) fn new(gpu: &Gpu, rows: usize) -> Result<Self> {
         let usage = wgpu::BufferUsages::STORAGE
             | wgpu::BufferUsages::COPY_SRC
             | wgpu::BufferUsages::COPY_DST;
@@ -89,7 +89,7 @@ impl Binner {
     ///
     /// # Errors
     /// As [`Gpu::program`].
-    pub fn new(gpu: &Gpu, samples: u32, constants: &[(String, Constant)]) -> Result<Self> {
+    pub(crate) fn new(gpu: &Gpu, samples: u32, constants: &[(String, Constant)]) -> Result<Self> {
         let text = |name, constants| shader::program(&[shader::named(name)], samples, constants);
         let (bin, scan) = (text("bin", constants), text("scan", &[]));
         let two = |entries: [&str; 2]| -> Result<[Program; 2]> {
@@ -110,7 +110,7 @@ impl Binner {
     ///
     /// # Errors
     /// As [`Gpu::run`].
-    pub fn touched(
+    pub(crate) fn touched(
         &self,
         gpu: &Gpu,
         timer: &Timer,
@@ -134,7 +134,7 @@ impl Binner {
     ///
     /// # Errors
     /// As [`Gpu::run`].
-    pub fn sort(
+    pub(crate) fn sort(
         &self,
         gpu: &Gpu,
         timer: &Timer,

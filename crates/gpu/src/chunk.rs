@@ -37,7 +37,7 @@ pub(super) struct Uploaded {
 impl Chunks {
     /// Cuts `trace` so that neither a chunk's columns nor a word for each of its rows take
     /// more than `bytes`, nor more than `rows` rows; of optional columns there are `read`.
-    pub fn of(trace: &Trace, bytes: u64, rows: u64, read: ColumnSet) -> Self {
+    pub(crate) fn of(trace: &Trace, bytes: u64, rows: u64, read: ColumnSet) -> Self {
         let header = trace.header();
         let wanted = |id: ColumnId| !id.is_optional() || read.contains(id);
         let stored: Vec<_> =
@@ -58,22 +58,22 @@ impl Chunks {
     }
 
     /// How many there are.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.list.len()
     }
 
     /// How many rows the `i`-th has.
-    pub fn rows(&self, i: usize) -> usize {
+    pub(crate) fn rows(&self, i: usize) -> usize {
         self.list[i].iter().map(|part| part.rows.len()).sum()
     }
 
     /// The bytes that the `i`-th takes.
-    pub fn bytes(&self, i: usize) -> u64 {
+    pub(crate) fn bytes(&self, i: usize) -> u64 {
         self.places(self.rows(i)).1
     }
 
     /// For each column, how many bytes its values have: none of a constant.
-    pub fn types(&self) -> impl Iterator<Item = (String, Constant)> {
+    pub(crate) fn types(&self) -> impl Iterator<Item = (String, Constant)> {
         ColumnId::ALL.into_iter().map(|id| {
             let bytes = self.stored.iter().find(|(s, _)| *s == id).map_or(0, |(_, t)| t.bytes());
             (loaders::bytes_constant(id), Constant::Whole(bytes as u32))
@@ -96,7 +96,13 @@ impl Chunks {
     ///
     /// # Errors
     /// As [`Trace::batch`] and [`Gpu::buffer`].
-    pub fn upload(&self, gpu: &Gpu, trace: &Trace, i: usize, frame: &Params) -> Result<Uploaded> {
+    pub(crate) fn upload(
+        &self,
+        gpu: &Gpu,
+        trace: &Trace,
+        i: usize,
+        frame: &Params,
+    ) -> Result<Uploaded> {
         let rows = self.rows(i);
         let (places, bytes) = self.places(rows);
         let mut params = Params { rows: rows as u32, ..*frame };

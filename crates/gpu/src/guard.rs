@@ -23,13 +23,13 @@ pub(crate) struct Guard {
 
 impl Guard {
     /// Of the device that errors call `name`.
-    pub fn new(name: impl Display) -> Self {
+    pub(crate) fn new(name: impl Display) -> Self {
         Guard { name: name.to_string(), lost: Arc::default() }
     }
 
     /// Has the device tell when it is lost. A device has room for one such callback, so that
     /// this is for devices of our own.
-    pub fn watch(&self, device: &wgpu::Device) {
+    pub(crate) fn watch(&self, device: &wgpu::Device) {
         let lost = self.lost.clone();
         device.set_device_lost_callback(move |_, why| {
             // The first reason is the cause of the others.
@@ -38,7 +38,7 @@ impl Guard {
     }
 
     /// An error of this device.
-    pub fn error(&self, what: impl Display, hint: impl Display) -> Error {
+    pub(crate) fn error(&self, what: impl Display, hint: impl Display) -> Error {
         Error::gpu(&self.name, what, hint)
     }
 
@@ -46,7 +46,7 @@ impl Guard {
     ///
     /// # Errors
     /// [`Error::Gpu`] with what the device said.
-    pub fn run<T>(
+    pub(crate) fn run<T>(
         &self,
         device: &wgpu::Device,
         doing: &str,
@@ -92,7 +92,7 @@ impl Guard {
     }
 
     /// Why memory could not be reached: that the device was lost, if it knows.
-    pub fn failed(&self, device: &wgpu::Device, doing: &str, why: impl Display) -> Error {
+    pub(crate) fn failed(&self, device: &wgpu::Device, doing: &str, why: impl Display) -> Error {
         // A device tells that it is lost when it is asked, and when its last work is over.
         let wait = wgpu::PollType::Wait { submission_index: None, timeout: Some(PATIENCE) };
         let polled = device.poll(wait);
@@ -108,7 +108,7 @@ impl Guard {
     ///
     /// # Errors
     /// [`Error::Gpu`] where the device was lost.
-    pub fn wait(&self, device: &wgpu::Device, doing: &str) -> Result<()> {
+    pub(crate) fn wait(&self, device: &wgpu::Device, doing: &str) -> Result<()> {
         let polled = device.poll(wgpu::PollType::wait_indefinitely());
         self.check(doing)?;
         polled.map_err(|e| self.failed(device, doing, e))?;
@@ -120,7 +120,7 @@ impl Guard {
     ///
     /// # Errors
     /// [`Error::Gpu`] where the device was lost or has no memory for that.
-    pub fn read<T>(
+    pub(crate) fn read<T>(
         &self,
         (device, queue): (&wgpu::Device, &wgpu::Queue),
         (buffer, part): (&wgpu::Buffer, Range<u64>),

@@ -33,7 +33,7 @@ static LOADERS: LazyLock<String> = LazyLock::new(|| {
 });
 
 /// The generated text of this name, if it is one.
-pub fn named(name: &str) -> Option<Shader> {
+pub(crate) fn named(name: &str) -> Option<Shader> {
     let text: &'static str = match name {
         "columns" => &COLUMNS,
         "loaders" => &LOADERS,
@@ -44,6 +44,6 @@ pub fn named(name: &str) -> Option<Shader> {
 
 /// The name of the shaders' constant that says how many bytes a column's values have: none
 /// of a constant.
-pub fn bytes_constant(id: ColumnId) -> String {
+pub(crate) fn bytes_constant(id: ColumnId) -> String {
     format!("{}_BYTES", id.name().to_uppercase())
 }

@@ -57,7 +57,7 @@ mirrored! {
 
 impl Params {
     /// Of a frame, without a chunk.
-    pub fn of(frame: &Frame) -> Self {
+    pub(crate) fn of(frame: &Frame) -> Self {
         let grid = frame.grid;
         let [low, high] = words(screendoor_trace::trace::SampleMask::first(frame.samples()).0);
         Params {

@@ -37,7 +37,7 @@ pub(super) const OWN: &[Shader] = &[
 ///
 /// # Panics
 /// Where there is none: a fault of the crate's own, or of a design's shader.
-pub fn named(name: &str) -> Shader {
+pub(crate) fn named(name: &str) -> Shader {
     if let Some(generated) = loaders::named(name) {
         return generated;
     }
@@ -54,7 +54,7 @@ pub fn named(name: &str) -> Shader {
 ///
 /// # Panics
 /// Where a file is missing: a fault of the crate's own.
-pub fn program(files: &[Shader], samples: u32, constants: &[(String, Constant)]) -> String {
+pub(crate) fn program(files: &[Shader], samples: u32, constants: &[(String, Constant)]) -> String {
     let mut text = String::new();
     for (name, value) in constants {
         writeln!(text, "const {name}: {value};").expect("strings can be written to");
@@ -72,21 +72,21 @@ pub(super) mod defect {
     use std::cell::Cell;
 
     /// A text of a shader, and what stands in its place.
-    pub type Defect = (&'static str, &'static str);
+    pub(crate) type Defect = (&'static str, &'static str);
 
     thread_local! {
         static PLANTED: Cell<Option<Defect>> = const { Cell::new(None) };
     }
 
     /// Runs `then` with a defect in the shaders that are put together meanwhile.
-    pub fn with<T>(defect: Option<Defect>, then: impl FnOnce() -> T) -> T {
+    pub(crate) fn with<T>(defect: Option<Defect>, then: impl FnOnce() -> T) -> T {
         PLANTED.set(defect);
         let result = then();
         PLANTED.set(None);
         result
     }
 
-    pub fn plant(text: String) -> String {
+    pub(crate) fn plant(text: String) -> String {
         match PLANTED.get() {
             Some((good, bad)) => text.replacen(good, bad, 1),
             None => text,

@@ -18,7 +18,7 @@ pub(super) struct Timer {
 }
 
 impl Timer {
-    pub fn new(gpu: &Gpu) -> Result<Self> {
+    pub(crate) fn new(gpu: &Gpu) -> Result<Self> {
         let descriptor = wgpu::QuerySetDescriptor {
             label: None,
             ty: wgpu::QueryType::Timestamp,
@@ -32,7 +32,7 @@ impl Timer {
 
     /// Starts at least `groups` groups of a program with its bindings, timed as part of
     /// `name`.
-    pub fn run(
+    pub(crate) fn run(
         &self,
         gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
@@ -70,7 +70,7 @@ impl Timer {
 
     /// Seconds by name; `None` where the device cannot tell, or where there were too many
     /// passes.
-    pub fn seconds(&self, gpu: &Gpu) -> Result<Option<BTreeMap<&'static str, f64>>> {
+    pub(crate) fn seconds(&self, gpu: &Gpu) -> Result<Option<BTreeMap<&'static str, f64>>> {
         let names = self.names.lock().expect("no thread panicked");
         let count = names.len() as u32;
         let Some(queries) = self.queries.as_ref().filter(|_| (1..MOST).contains(&count)) else {

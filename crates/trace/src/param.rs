@@ -216,12 +216,12 @@ pub trait Options: Copy + 'static {
 /// each variant stands beside its name and its help.
 #[macro_export]
 macro_rules! options {
-    ($(#[$meta:meta])* pub enum $name:ident {
+    ($(#[$meta:meta])* $vis:vis enum $name:ident {
         $($variant:ident = $text:literal : $help:literal),+ $(,)?
     }) => {
         $(#[$meta])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        pub enum $name { $(#[doc = $help] $variant),+ }
+        $vis enum $name { $(#[doc = $help] $variant),+ }
 
         impl $crate::param::Options for $name {
             const CHOICES: &'static [$crate::param::Choice] =
@@ -410,7 +410,7 @@ mod tests {
 
     options! {
         /// A colour of a test.
-        pub enum Colour { Red = "red": "as a rose", Blue = "blue": "as the sky" }
+        enum Colour { Red = "red": "as a rose", Blue = "blue": "as the sky" }
     }
 
     const SORT: Typed<bool> = Typed::flag("sort", true, "whether to sort");

@@ -3,10 +3,10 @@
 use std::error::Error;
 use std::process::{Command, Stdio};
 
-pub type Result<T> = std::result::Result<T, Box<dyn Error>>;
+pub(crate) type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
 /// Runs a command: what it writes.
-pub fn call(command: &mut Command) -> Result<Vec<u8>> {
+pub(crate) fn call(command: &mut Command) -> Result<Vec<u8>> {
     let output = command.stderr(Stdio::inherit()).output()?;
     match output.status.success() {
         true => Ok(output.stdout),

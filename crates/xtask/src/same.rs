@@ -13,7 +13,7 @@ use crate::process::{Result, call};
 
 /// Compare what two versions of the program give, byte for byte
 #[derive(Args)]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// A commit, which is built in a worktree of its own, or the path of a program
     before: String,
     /// The same of what is held against it
@@ -26,7 +26,7 @@ pub struct Arguments {
 /// What of a record depends on the machine and the moment.
 const TIMES: &str = "speed";
 
-pub fn run(arguments: &Arguments) -> Result<bool> {
+pub(crate) fn run(arguments: &Arguments) -> Result<bool> {
     let folder = tempfile::tempdir()?;
     let sides = [("before", &arguments.before), ("after", &arguments.after)];
     let mut found = Vec::new();

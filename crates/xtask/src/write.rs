@@ -9,7 +9,7 @@ use crate::process::{Result, call};
 
 /// Write the tree's files that the program makes: in what they differ then is to be looked at
 #[derive(Args)]
-pub struct Arguments {
+pub(crate) struct Arguments {
     /// Which; all where none is named
     what: Vec<What>,
     /// The folder with the models that docs/RESULTS.md names; without it that file is left
@@ -56,7 +56,7 @@ impl What {
     }
 }
 
-pub fn run(arguments: &Arguments) -> Result<bool> {
+pub(crate) fn run(arguments: &Arguments) -> Result<bool> {
     let named = |what: &What| arguments.what.is_empty() || arguments.what.contains(what);
     let mut all = true;
     for what in What::value_variants().iter().filter(|what| named(what)) {

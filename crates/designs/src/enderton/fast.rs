@@ -13,7 +13,7 @@ use screendoor_trace::trace::MAX_SAMPLES;
 
 /// [`EndertonSampler`] with masks that are computed, stratified within a round.
 #[derive(Clone, Debug)]
-pub struct FastEnderton<const N: usize> {
+pub(super) struct FastEnderton<const N: usize> {
     plain: EndertonSampler<N>,
     /// Each sample on its own.
     naive: bool,
@@ -22,7 +22,7 @@ pub struct FastEnderton<const N: usize> {
 
 impl<const N: usize> FastEnderton<N> {
     /// The twin of `plain`, if it has one: tables are looked up one by one.
-    pub fn new(plain: EndertonSampler<N>, depth_bits: u32) -> Option<Self> {
+    pub(super) fn new(plain: EndertonSampler<N>, depth_bits: u32) -> Option<Self> {
         let naive = match plain.mask {
             MaskRule::Naive => true,
             MaskRule::Stratified => false,

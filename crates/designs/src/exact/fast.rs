@@ -15,7 +15,7 @@ use screendoor_trace::trace::{Block, DepthPlane, SampleMask};
 
 /// The engine. It is compiled once for all sample counts: it works in blocks of
 /// eight samples.
-pub struct Fast {
+pub(super) struct Fast {
     frame: Frame,
     /// Is asked for what the engine says of the design.
     reference: Box<dyn TiledDesign>,
@@ -37,7 +37,7 @@ struct Layer {
 
 impl Fast {
     /// The engine beside `reference`, on the instructions of `level`.
-    pub fn new(frame: &Frame, reference: Box<dyn TiledDesign>, level: Level) -> Self {
+    pub(super) fn new(frame: &Frame, reference: Box<dyn TiledDesign>, level: Level) -> Self {
         Fast { frame: frame.clone(), reference, level }
     }
 }

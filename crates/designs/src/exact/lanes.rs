@@ -5,15 +5,15 @@ use fearless_simd::{Simd, f64x8, mask64x8, prelude::*};
 use screendoor_trace::trace::DepthPlane;
 
 /// Samples that are composited together.
-pub const LANES: usize = 8;
+pub(super) const LANES: usize = 8;
 
 /// A layer as the lanes read it: all that is multiplied is converted once, and
 /// lies in one line of the cache.
-pub type Row = [f64; 8];
+pub(super) type Row = [f64; 8];
 
 /// The row of a layer that covers these of the lanes' samples.
 #[inline(always)]
-pub fn row(covered: u8, depth: DepthPlane, [r, g, b]: [f32; 3], alpha: f32) -> Row {
+pub(super) fn row(covered: u8, depth: DepthPlane, [r, g, b]: [f32; 3], alpha: f32) -> Row {
     // As signed integers, which every instruction set converts.
     let z = f64::from((depth.z.0 ^ 1 << 31) as i32);
     let covered = f64::from_bits(u64::from(covered));
@@ -23,29 +23,29 @@ pub fn row(covered: u8, depth: DepthPlane, [r, g, b]: [f32; 3], alpha: f32) -> R
 
 /// Whether a row's layer covers the lane's sample.
 #[inline(always)]
-pub fn covers(row: &Row, lane: usize) -> bool {
+pub(super) fn covers(row: &Row, lane: usize) -> bool {
     row[3].to_bits() >> lane & 1 == 1
 }
 
 /// A layer's depths at the samples, over [`INTEGERS`].
-pub type Depths = [f64; LANES];
+pub(super) type Depths = [f64; LANES];
 
 /// The depth at the lane's sample.
 #[inline(always)]
-pub fn depth_at(depths: &Depths, lane: usize) -> u32 {
+pub(super) fn depth_at(depths: &Depths, lane: usize) -> u32 {
     depths[lane].to_bits() as u32
 }
 
 /// Where the samples of the lanes lie, in pixels.
 #[derive(Clone, Copy)]
-pub struct Offsets {
+pub(super) struct Offsets {
     x: [f64; LANES],
     y: [f64; LANES],
 }
 
 impl Offsets {
     /// Of up to [`LANES`] samples at `positions`, in 1/16 pixel.
-    pub fn new(positions: &[[i8; 2]]) -> Self {
+    pub(super) fn new(positions: &[[i8; 2]]) -> Self {
         let mut offsets = Offsets { x: [0.0; LANES], y: [0.0; LANES] };
         for (lane, [x, y]) in positions.iter().enumerate() {
             offsets.x[lane] = f64::from(*x) / 16.0;
@@ -60,7 +60,7 @@ impl Offsets {
 const INTEGERS: f64 = 3.0 * (1_u64 << 51) as f64;
 
 /// Samples' colours while layers come in, near ones first.
-pub struct Composite<S: Simd> {
+pub(super) struct Composite<S: Simd> {
     simd: S,
     x: f64x8<S>,
     y: f64x8<S>,
@@ -74,7 +74,7 @@ pub struct Composite<S: Simd> {
 impl<S: Simd> Composite<S> {
     /// Before the first layer.
     #[inline(always)]
-    pub fn new(simd: S, offsets: &Offsets) -> Self {
+    pub(super) fn new(simd: S, offsets: &Offsets) -> Self {
         let zero = f64x8::splat(simd, 0.0);
         Composite {
             simd,
@@ -92,7 +92,7 @@ impl<S: Simd> Composite<S> {
     /// opaque already, adds ±0 to its colour; that keeps all bits, for a colour is
     /// never −0: it begins as +0, and no sum is −0 unless both its terms are.
     #[inline(always)]
-    pub fn add(&mut self, rows: &[Row], depths: &mut [Depths]) {
+    pub(super) fn add(&mut self, rows: &[Row], depths: &mut [Depths]) {
         let splat = |v| f64x8::splat(self.simd, v);
         let (zero, one) = (splat(0.0), splat(1.0));
         // Back to unsigned depths, and 15/32 less: to the nearest integer is then
@@ -122,7 +122,7 @@ impl<S: Simd> Composite<S> {
     /// The samples' colours, channel by channel, and the set of those at which the
     /// layers did not come by strictly rising depth: their colours may be wrong.
     #[inline(always)]
-    pub fn over(&self, background: [f64; 3]) -> ([[f64; LANES]; 3], u64) {
+    pub(super) fn over(&self, background: [f64; 3]) -> ([[f64; LANES]; 3], u64) {
         let mut colours = [[0.0; LANES]; 3];
         for (out, (c, b)) in colours.iter_mut().zip(self.colour.iter().zip(background)) {
             (*c + self.transmittance * f64x8::splat(self.simd, b)).store_slice(out);

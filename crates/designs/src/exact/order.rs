@@ -3,12 +3,12 @@
 use fearless_simd::{Simd, i32x16, prelude::*};
 
 /// Layers that are ranked and composited at a time.
-pub const CHUNK: usize = 128;
+pub(super) const CHUNK: usize = 128;
 
 /// Up to [`CHUNK`] keys, which stand in API order, cut to 32 bits in `short`; padded
 /// with large ones.
 #[inline(always)]
-pub fn shorten<'a>(keys: &[u64], short: &'a mut [i32; CHUNK]) -> &'a [i32] {
+pub(super) fn shorten<'a>(keys: &[u64], short: &'a mut [i32; CHUNK]) -> &'a [i32] {
     let padded = &mut short[..keys.len().next_multiple_of(RANKED)];
     for (i, (short, key)) in padded.iter_mut().zip(keys).enumerate() {
         let depth = (key >> 32) as u32 / CHUNK as u32;
@@ -28,7 +28,7 @@ const RANKED: usize = 16;
 /// whether the order is right is found out when the layers are composited. This takes
 /// more comparisons than a sort, but sixteen at a time, and none to be guessed.
 #[inline(always)]
-pub fn rank<S: Simd>(simd: S, key: i32, short: &[i32]) -> usize {
+pub(super) fn rank<S: Simd>(simd: S, key: i32, short: &[i32]) -> usize {
     let key = i32x16::splat(simd, key);
     let mut rank = 0;
     for keys in short.chunks_exact(RANKED) {
@@ -39,7 +39,7 @@ pub fn rank<S: Simd>(simd: S, key: i32, short: &[i32]) -> usize {
 
 /// Keeps the keys that are marked, without a branch that would be taken at random.
 #[inline(always)]
-pub fn keep(keys: impl Iterator<Item = (u64, bool)>, kept: &mut Vec<u64>) {
+pub(super) fn keep(keys: impl Iterator<Item = (u64, bool)>, kept: &mut Vec<u64>) {
     let mut count = 0;
     for (key, keep) in keys {
         kept[count] = key;
@@ -49,7 +49,7 @@ pub fn keep(keys: impl Iterator<Item = (u64, bool)>, kept: &mut Vec<u64>) {
 }
 
 /// Sorts keys of which few are out of place.
-pub fn insert_in_order(keys: &mut [u64]) {
+pub(super) fn insert_in_order(keys: &mut [u64]) {
     for end in 1..keys.len() {
         let key = keys[end];
         let mut place = end;

@@ -43,7 +43,7 @@ impl<'a> Rasteriser<'a> {
     ///
     /// # Errors
     /// [`screendoor_trace::error::Error::Gpu`] where the adapter has no such frame or no memory.
-    pub fn new(gpu: &'a Gpu, size: [u32; 2], capacity: u32) -> Result<Self> {
+    pub(super) fn new(gpu: &'a Gpu, size: [u32; 2], capacity: u32) -> Result<Self> {
         let longest = gpu.limits().max_texture_dimension_2d;
         if size.iter().any(|side| *side > longest) {
             return Err(gpu.error(
@@ -79,7 +79,7 @@ impl<'a> Rasteriser<'a> {
     ///
     /// # Errors
     /// [`screendoor_trace::error::Error::Gpu`] where the adapter fails; as `each`.
-    pub fn draw(
+    pub(super) fn draw(
         &self,
         corners: &[Corner],
         mut each: impl FnMut(Vec<RawFragment>) -> Result<()>,

@@ -8,15 +8,15 @@ mod convergence;
 mod cost;
 mod document;
 mod error;
-pub mod packed;
+pub(crate) mod packed;
 mod page;
 mod parts;
 mod perception;
 mod reproduce;
 #[cfg(test)]
 mod tests;
-pub mod verification;
-pub mod viewer;
+pub(crate) mod verification;
+pub(crate) mod viewer;
 pub(crate) mod words;
 
 pub use choice::answer;

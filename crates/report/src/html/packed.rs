@@ -16,7 +16,7 @@ use screendoor_trace::picture::Picture;
 /// What a pixel's bits are foretold from.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Source {
+pub(crate) enum Source {
     /// Nothing.
     Nothing,
     /// The pixel to the left, in the first column nothing.
@@ -27,7 +27,7 @@ pub enum Source {
 
 /// How a picture was foretold: which steps a reader undoes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
-pub struct Prediction {
+pub(crate) struct Prediction {
     /// What a pixel is foretold from.
     pub from: Source,
     /// Whether, after that, green is foretold from red and blue from green.
@@ -46,7 +46,7 @@ const PREDICTIONS: [Prediction; 6] = [
 
 /// A picture as text.
 #[derive(Clone, Debug)]
-pub struct PackedPicture {
+pub(crate) struct PackedPicture {
     /// What a reader undoes.
     pub prediction: Prediction,
     /// The bytes, deflated, as base64.
@@ -58,7 +58,7 @@ pub struct PackedPicture {
 ///
 /// # Panics
 /// Where the sizes differ.
-pub fn pack_picture(picture: &Picture, reference: Option<&Picture>) -> PackedPicture {
+pub(crate) fn pack_picture(picture: &Picture, reference: Option<&Picture>) -> PackedPicture {
     let (words, width) = (words(picture), picture.width() as usize);
     let reference = reference.map(|r| {
         assert_eq!(r.grid(), picture.grid());
@@ -73,7 +73,7 @@ pub fn pack_picture(picture: &Picture, reference: Option<&Picture>) -> PackedPic
 }
 
 /// `bytes`, deflated, as base64.
-pub fn pack(bytes: &[u8]) -> String {
+pub(crate) fn pack(bytes: &[u8]) -> String {
     base64::engine::general_purpose::STANDARD.encode(deflate(bytes, Compression::best()))
 }
 

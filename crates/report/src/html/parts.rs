@@ -20,7 +20,7 @@ pub(super) struct Content<'a> {
 }
 
 impl<'a> Content<'a> {
-    pub fn new(results: &'a Results, extras: &'a Extras) -> Self {
+    pub(super) fn new(results: &'a Results, extras: &'a Extras) -> Self {
         let family = |series: &String| {
             let own = results.records.iter().find(|r| r.series == *series);
             own.map_or("", |r| r.family.as_str())
@@ -31,49 +31,49 @@ impl<'a> Content<'a> {
     }
 
     /// The names of the study's scenes.
-    pub fn scenes(&self) -> impl Iterator<Item = &'a str> {
+    pub(super) fn scenes(&self) -> impl Iterator<Item = &'a str> {
         self.results.study.scenes.iter().map(|s| s.name.as_str())
     }
 
-    pub fn designs(&self) -> &'a [String] {
+    pub(super) fn designs(&self) -> &'a [String] {
         &self.results.study.designs
     }
 
     /// A design's record at the reference count.
-    pub fn at_count(&self, scene: &str, series: &str) -> Option<&'a Record> {
+    pub(super) fn at_count(&self, scene: &str, series: &str) -> Option<&'a Record> {
         self.results.record(scene, series, self.count)
     }
 
     /// A panel for each scene.
-    pub fn by_scene(&self, panel: impl Fn(&'a str) -> Markup) -> Markup {
+    pub(super) fn by_scene(&self, panel: impl Fn(&'a str) -> Markup) -> Markup {
         let panels: Vec<_> = self.scenes().map(|s| (s.to_string(), panel(s))).collect();
         tabs("Scene", &panels)
     }
 
     /// The command that measures the whole study.
-    pub fn study_command(&self) -> Markup {
+    pub(super) fn study_command(&self) -> Markup {
         command(&self.extras.command)
     }
 
     /// The command that gives a run's errors and counts.
-    pub fn replay(&self, record: &Record) -> String {
+    pub(super) fn replay(&self, record: &Record) -> String {
         replay_command(self.results, record, record.seeds)
     }
 
     /// [`Content::replay`] of the baseline on the first scene that has it, as a pattern for all others.
-    pub fn replay_one(&self) -> Markup {
+    pub(super) fn replay_one(&self) -> Markup {
         let baseline = &self.results.study.baseline;
         let found = self.scenes().find_map(|s| self.at_count(s, baseline));
         html! { @if let Some(record) = found { (command(&self.replay(record))) } }
     }
 
     /// A design's marker and name.
-    pub fn named(&self, series: &str) -> Markup {
+    pub(super) fn named(&self, series: &str) -> Markup {
         html! { span class="design" { (key(&self.styles.of(series))) (name(series)) } }
     }
 
     /// All designs with their markers: what a chart's marks mean.
-    pub fn legend(&self, shown: impl Fn(&str) -> bool) -> Markup {
+    pub(super) fn legend(&self, shown: impl Fn(&str) -> bool) -> Markup {
         html! {
             ul class="legend" aria-label="Designs" {
                 @for series in self.designs().iter().filter(|s| shown(s)) {
@@ -156,18 +156,18 @@ pub(super) enum Cell {
 
 impl Cell {
     /// A number with three digits that count.
-    pub fn number(v: f64) -> Self {
+    pub(super) fn number(v: f64) -> Self {
         Cell::Number(v, figures(v))
     }
 
     /// Words.
-    pub fn text(text: impl Into<String>) -> Self {
+    pub(super) fn text(text: impl Into<String>) -> Self {
         let text = text.into();
         Cell::Text(html! { (text) })
     }
 
     /// An estimate, or why there is none.
-    pub fn estimate(e: Option<Estimate>, decimals: usize, why: &str) -> Self {
+    pub(super) fn estimate(e: Option<Estimate>, decimals: usize, why: &str) -> Self {
         e.map_or(Cell::Missing(why.to_string()), |e| Cell::Estimate(e, decimals))
     }
 

@@ -22,7 +22,7 @@ fn anchor(heading: &str) -> String {
 }
 
 /// A table of all that publications print or say, each linked to its section.
-pub fn summary(list: &[Against]) -> Section {
+pub(crate) fn summary(list: &[Against]) -> Section {
     let count = |agreement| list.iter().filter(|a| a.agreement == agreement).count();
     let body = html! {
         p class="prose" {
@@ -69,7 +69,7 @@ fn row(a: &Against) -> Markup {
 }
 
 /// A document's sections. `figure` gives the bytes of a picture or chart by its file's name.
-pub fn sections(document: &[document::Section], figure: &Figure<'_>) -> Vec<Section> {
+pub(crate) fn sections(document: &[document::Section], figure: &Figure<'_>) -> Vec<Section> {
     let mut list: Vec<Section> = Vec::new();
     for section in document {
         let title = section.title.words();

@@ -13,7 +13,7 @@ use screendoor_trace::picture::Picture;
 
 /// A design's picture and what is said of it.
 #[derive(Clone, Debug)]
-pub struct ViewedPicture<'a> {
+pub(crate) struct ViewedPicture<'a> {
     /// The design, as `--design` takes it.
     pub name: String,
     /// Its picture, of the reference's size.
@@ -32,7 +32,7 @@ pub struct ViewedPicture<'a> {
 
 /// The pictures of one scene.
 #[derive(Clone, Debug)]
-pub struct ViewedScene<'a> {
+pub(crate) struct ViewedScene<'a> {
     /// Its name.
     pub name: String,
     /// Samples per pixel.
@@ -51,7 +51,7 @@ pub struct ViewedScene<'a> {
 
 /// Style rules, for the page's head. They take the page's variables `--bg`,
 /// `--fg`, `--muted`, `--line`, `--panel`, `--accent`, `--good` and `--bad`.
-pub const STYLE: &str = concat!(include_str!("viewer.css"), include_str!("inspector.css"));
+pub(crate) const STYLE: &str = concat!(include_str!("viewer.css"), include_str!("inspector.css"));
 
 /// The script, which [`element`] holds: one function, so that no name of it is the
 /// page's.
@@ -68,7 +68,7 @@ const SCRIPT: &str = concat!(
 /// # Panics
 /// Where there is no scene or one has no pictures, and where a picture or a FLIP
 /// map has another size than the scene's reference.
-pub fn element(scenes: &[ViewedScene<'_>]) -> Markup {
+pub(crate) fn element(scenes: &[ViewedScene<'_>]) -> Markup {
     assert!(!scenes.is_empty() && scenes.iter().all(|s| !s.pictures.is_empty()));
     let mut blobs = Blobs::default();
     let data: Vec<Value> = scenes.iter().map(|scene| scene_data(scene, &mut blobs)).collect();

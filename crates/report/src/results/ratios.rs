@@ -25,13 +25,13 @@ impl OnScenes {
     }
 
     /// Their geometric mean.
-    pub fn mean(&self) -> f64 {
+    pub(super) fn mean(&self) -> f64 {
         let logs: f64 = self.known().map(|(_, e)| e.value.ln()).sum();
         (logs / self.known().count().max(1) as f64).exp()
     }
 
     /// The least and the greatest, with the scenes that have them.
-    pub fn range(&self) -> String {
+    pub(super) fn range(&self) -> String {
         let by = |a: &&(String, Estimate), b: &&(String, Estimate)| a.1.value.total_cmp(&b.1.value);
         let ends = self.known().min_by(by).zip(self.known().max_by(by));
         ends.map_or("not measured".to_string(), |((low_name, low), (high_name, high))| {
@@ -41,17 +41,17 @@ impl OnScenes {
     }
 
     /// How many lie below a bound by more than their interval.
-    pub fn below(&self, bound: f64) -> usize {
+    pub(super) fn below(&self, bound: f64) -> usize {
         self.0.iter().filter(|(_, e)| below(*e, bound)).count()
     }
 
     /// The same above it.
-    pub fn above(&self, bound: f64) -> usize {
+    pub(super) fn above(&self, bound: f64) -> usize {
         self.0.iter().filter(|(_, e)| above(*e, bound)).count()
     }
 
     /// On which scenes a rule holds.
-    pub fn holding(&self, rule: impl Fn(Estimate) -> bool) -> Holding {
+    pub(super) fn holding(&self, rule: impl Fn(Estimate) -> bool) -> Holding {
         holding(self.0.iter().map(|(name, e)| (name.as_str(), rule(*e))))
     }
 }
@@ -80,7 +80,7 @@ pub(super) fn holding<'a>(scenes: impl Iterator<Item = (&'a str, bool)>) -> Hold
 impl Holding {
     /// In words: 'on all 9 scenes', 'on 7 of 9 scenes (not on `oak`, `smoke`)', 'on none of
     /// 9 scenes'.
-    pub fn words(&self) -> String {
+    pub(super) fn words(&self) -> String {
         let (all, but) = (self.each.len(), self.but.len());
         match but {
             _ if all == 0 => "on no scene that was measured".to_string(),
@@ -92,7 +92,7 @@ impl Holding {
     }
 
     /// Whether it holds everywhere.
-    pub fn everywhere(&self) -> bool {
+    pub(super) fn everywhere(&self) -> bool {
         !self.each.is_empty() && self.but.is_empty()
     }
 }

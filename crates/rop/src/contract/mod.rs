@@ -4,21 +4,21 @@
 //! Invariant: nothing here knows a kit, the replay or a design, and no two files need each
 //! other.
 
-pub mod blueprint;
+pub(crate) mod blueprint;
 pub mod colour;
-pub mod contents;
-pub mod design;
-pub mod event;
-pub mod frame;
-pub mod info;
-pub mod layout;
-pub mod opacity;
+pub(crate) mod contents;
+pub(crate) mod design;
+pub(crate) mod event;
+pub(crate) mod frame;
+pub(crate) mod info;
+pub(crate) mod layout;
+pub(crate) mod opacity;
 pub mod over_opaque;
-pub mod port;
-pub mod primitive_depths;
-pub mod promise;
-pub mod promises;
-pub mod samples;
-pub mod shader;
-pub mod tiled;
-pub mod words;
+pub(crate) mod port;
+pub(crate) mod primitive_depths;
+pub(crate) mod promise;
+pub(crate) mod promises;
+pub(crate) mod samples;
+pub(crate) mod shader;
+pub(crate) mod tiled;
+pub(crate) mod words;

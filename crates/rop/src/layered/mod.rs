@@ -1,5 +1,5 @@
 //! The kit of the designs that keep layers: depth, colour and alpha of a few fragments.
 
-pub mod bounded;
+pub(crate) mod bounded;
 pub mod layers;
-pub mod normalise;
+pub(crate) mod normalise;

@@ -23,7 +23,7 @@ pub(super) struct Part {
 
 impl Part {
     /// The same rows, a unit's at a time.
-    pub fn cut(&self) -> impl Iterator<Item = Part> + '_ {
+    pub(super) fn cut(&self) -> impl Iterator<Item = Part> + '_ {
         let Part { batch, rows } = self;
         let starts = rows.clone().step_by(UNIT_ROWS);
         starts.map(|start| Part {
@@ -57,32 +57,32 @@ pub(super) struct Sorter {
 
 impl Unit {
     /// Fills it with those rows of `part` that belong to the group: a counting sort, stable.
-    pub fn fill(&mut self, part: &Part, frame: &Frame, group: &Group, sorter: &mut Sorter) {
+    pub(super) fn fill(&mut self, part: &Part, frame: &Frame, group: &Group, sorter: &mut Sorter) {
         self.batch = Some(part.batch.clone());
         sorter.find(part, frame.grid, group, &mut self.tiles);
         sorter.place(&mut self.stretches, &mut self.tiles);
     }
 
     /// The rows' batch.
-    pub fn batch(&self) -> &Batch {
+    pub(super) fn batch(&self) -> &Batch {
         self.batch.as_ref().expect("it has been filled")
     }
 
     /// Its tiles, and where in [`Unit::stretches`] they stand.
-    pub fn tiles(&self) -> impl Iterator<Item = (TileId, Range<u32>)> {
+    pub(super) fn tiles(&self) -> impl Iterator<Item = (TileId, Range<u32>)> {
         let mut start = 0;
         self.tiles.iter().map(move |(tile, end)| (*tile, std::mem::replace(&mut start, *end)..*end))
     }
 
     /// Stretches of one tile, in API order.
     #[inline]
-    pub fn stretches(&self, range: Range<u32>) -> &[Stretch] {
+    pub(super) fn stretches(&self, range: Range<u32>) -> &[Stretch] {
         &self.stretches[range.start as usize..range.end as usize]
     }
 }
 
 impl Sorter {
-    pub fn new(frame: &Frame) -> Self {
+    pub(super) fn new(frame: &Frame) -> Self {
         let cursors = vec![0; frame.grid.count()];
         Sorter { level: Level::new(), cursors, met: Vec::new() }
     }

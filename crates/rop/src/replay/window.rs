@@ -77,7 +77,7 @@ impl<'a> Windows<'a> {
     ///
     /// # Errors
     /// As [`Trace::batch`].
-    pub fn new(
+    pub(super) fn new(
         trace: &'a Trace,
         frame: &'a Frame,
         group: &'a Group,
@@ -106,7 +106,7 @@ impl<'a> Windows<'a> {
     ///
     /// # Errors
     /// As [`Trace::batch`].
-    pub fn fill(&mut self, window: &mut Window) -> Result<bool> {
+    pub(super) fn fill(&mut self, window: &mut Window) -> Result<bool> {
         let parts = self.take();
         let batches = self.plan();
         let this = &*self;
@@ -204,7 +204,7 @@ impl Default for Window {
 impl Window {
     /// Draws the window's fragments into the tiles' states, tiles in parallel; counts
     /// events where it is asked to.
-    pub fn draw(
+    pub(super) fn draw(
         &self,
         design: &dyn TiledDesign,
         frame: &Frame,

@@ -2,13 +2,13 @@
 //! them.
 
 pub mod depth_bits;
-pub mod dither;
+pub(crate) mod dither;
 pub mod fast;
 mod methods;
-pub mod pixel_order;
-pub mod reference_value;
-pub mod subset;
-pub mod surface;
+pub(crate) mod pixel_order;
+pub(crate) mod reference_value;
+pub(crate) mod subset;
+pub(crate) mod surface;
 pub mod tracked;
 
 pub use methods::*;

@@ -36,7 +36,7 @@ pub(crate) struct Geometry<'a> {
 }
 
 impl<'a> Geometry<'a> {
-    pub fn new(scene: &'a Scene, camera: &'a Camera) -> Self {
+    pub(super) fn new(scene: &'a Scene, camera: &'a Camera) -> Self {
         let mut starts = vec![0];
         for object in &scene.objects {
             // Scenes with more than 2^32 triangles are refused on loading.
@@ -48,17 +48,17 @@ impl<'a> Geometry<'a> {
     }
 
     /// How many triangles there are.
-    pub fn len(&self) -> u32 {
+    pub(super) fn len(&self) -> u32 {
         *self.starts.last().expect("never empty")
     }
 
     /// The triangles of an object.
-    pub fn of_object(&self, object: usize) -> std::ops::Range<u32> {
+    pub(super) fn of_object(&self, object: usize) -> std::ops::Range<u32> {
         self.starts[object]..self.starts[object + 1]
     }
 
     /// Triangle `primitive`.
-    pub fn triangle(&self, primitive: u32) -> Triangle {
+    pub(super) fn triangle(&self, primitive: u32) -> Triangle {
         let index = self.starts.partition_point(|start| *start <= primitive) - 1;
         let object = &self.scene.objects[index];
         let local = primitive - self.starts[index];

@@ -77,7 +77,11 @@ pub(crate) struct Hit {
 
 impl<'a> Raster<'a> {
     /// `offsets` are the samples' in sub-pixel steps from the pixel's centre.
-    pub fn new(triangle: &'a ScreenTriangle, offsets: &'a [[i64; 2]], size: [u32; 2]) -> Self {
+    pub(super) fn new(
+        triangle: &'a ScreenTriangle,
+        offsets: &'a [[i64; 2]],
+        size: [u32; 2],
+    ) -> Self {
         let [p0, p1, p2] = triangle.corners;
         let edges =
             [Edge::new(p1, p2, offsets), Edge::new(p2, p0, offsets), Edge::new(p0, p1, offsets)];
@@ -99,17 +103,17 @@ impl<'a> Raster<'a> {
     }
 
     /// The first and the last row that it may touch; empty where they cross.
-    pub fn rows(&self) -> (i64, i64) {
+    pub(super) fn rows(&self) -> (i64, i64) {
         if self.columns.0 > self.columns.1 { (0, -1) } else { self.rows }
     }
 
     /// How many pixels its bounding box holds within a row.
-    pub fn columns(&self) -> i64 {
+    pub(super) fn columns(&self) -> i64 {
         self.columns.1 - self.columns.0 + 1
     }
 
     /// Finds the pixels of row `y` that have a covered sample, from the left.
-    pub fn row(&self, y: i64, mut found: impl FnMut(Hit)) {
+    pub(super) fn row(&self, y: i64, mut found: impl FnMut(Hit)) {
         let centre_y = y * STEPS + STEPS / 2;
         let mut span = self.columns;
         for edge in &self.edges {
@@ -134,7 +138,7 @@ impl<'a> Raster<'a> {
 
     /// What it leaves in pixel `[x, y]` where it covers `coverage` there, whatever its own
     /// edges say.
-    pub fn covered(&self, [x, y]: [i64; 2], coverage: SampleMask) -> Hit {
+    pub(super) fn covered(&self, [x, y]: [i64; 2], coverage: SampleMask) -> Hit {
         let centre = [x, y].map(|v| v * STEPS + STEPS / 2);
         self.hit([x, y], self.edges.map(|e| e.at(centre)), coverage)
     }
@@ -152,12 +156,12 @@ impl<'a> Raster<'a> {
     }
 
     /// How far a point lies outside, in sub-pixel steps; 0 inside.
-    pub fn outside(&self, point: [i64; 2]) -> f64 {
+    pub(super) fn outside(&self, point: [i64; 2]) -> f64 {
         if self.edges.iter().all(|e| e.at(point) >= 0) { 0.0 } else { self.distance(point) }
     }
 
     /// How far a point lies from the nearest of its edges, in sub-pixel steps.
-    pub fn distance(&self, point: [i64; 2]) -> f64 {
+    pub(super) fn distance(&self, point: [i64; 2]) -> f64 {
         let corners = self.triangle.corners;
         let edge = |i: usize| {
             let [from, to] = [corners[i], corners[(i + 1) % 3]].map(|p| p.map(|v| v as f64));
@@ -220,7 +224,7 @@ impl<'a> Raster<'a> {
 
     /// The weights of the three corners at a point, in perspective; and how they
     /// change per pixel to the right and downwards.
-    pub fn weights(&self, point: [i64; 2]) -> Weights {
+    pub(super) fn weights(&self, point: [i64; 2]) -> Weights {
         let t = self.triangle;
         let area = t.area as f64;
         let [p0, p1, p2] = t.corners;

@@ -32,7 +32,7 @@ pub(crate) struct Shader<'a> {
 impl<'a> Shader<'a> {
     /// `alpha`, where given, replaces the materials' own; texture alphas still
     /// multiply it.
-    pub fn new(scene: &'a Scene, camera: &'a Camera, alpha: Option<f32>) -> Self {
+    pub(super) fn new(scene: &'a Scene, camera: &'a Camera, alpha: Option<f32>) -> Self {
         let turn = |light: Vec3| {
             let l = light.as_dvec3();
             let turned = camera.right * l.x + camera.up * l.y + camera.back * l.z;
@@ -42,12 +42,12 @@ impl<'a> Shader<'a> {
     }
 
     /// Whether the back of a surface of `material` is drawn.
-    pub fn material(&self, index: usize) -> &Material {
+    pub(super) fn material(&self, index: usize) -> &Material {
         &self.scene.materials[index]
     }
 
     /// The one alpha that every fragment of the scene has, if there is one.
-    pub fn constant_alpha(&self) -> Option<f32> {
+    pub(super) fn constant_alpha(&self) -> Option<f32> {
         let mut common = None;
         for shape in &self.scene.shapes {
             let material = self.material(shape.material());
@@ -83,7 +83,7 @@ impl<'a> Shader<'a> {
     /// Linear colour and alpha of a fragment of `triangle` where its vertices
     /// have these weights; `None` where there is nothing: an alpha of 0 or next to
     /// it, or cut out by a mask.
-    pub fn shade(&self, triangle: &Triangle, weights: &Weights) -> Option<([f32; 3], f32)> {
+    pub(super) fn shade(&self, triangle: &Triangle, weights: &Weights) -> Option<([f32; 3], f32)> {
         let material = self.material(triangle.material);
         let [a, b, c] = &triangle.vertices;
         // From the first vertex on, so that what is equal at all three stays exactly that.

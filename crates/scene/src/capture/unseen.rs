@@ -38,11 +38,11 @@ impl fmt::Display for Unseen {
 pub(super) struct Recorded(Vec<AtomicBool>);
 
 impl Recorded {
-    pub fn new(objects: usize) -> Self {
+    pub(super) fn new(objects: usize) -> Self {
         Recorded((0..objects).map(|_| AtomicBool::new(false)).collect())
     }
 
-    pub fn mark(&self, object: u32) {
+    pub(super) fn mark(&self, object: u32) {
         self.0[object as usize].store(true, Ordering::Relaxed);
     }
 

@@ -13,22 +13,22 @@ pub(super) struct Bytes<'a> {
 }
 
 impl<'a> Bytes<'a> {
-    pub fn new(place: &'a str, bytes: &'a [u8]) -> Self {
+    pub(super) fn new(place: &'a str, bytes: &'a [u8]) -> Self {
         Bytes { place, bytes, at: 0 }
     }
 
     /// How many bytes come before the next.
-    pub fn at(&self) -> usize {
+    pub(super) fn at(&self) -> usize {
         self.at
     }
 
     /// How many bytes are left.
-    pub fn left(&self) -> usize {
+    pub(super) fn left(&self) -> usize {
         self.bytes.len() - self.at
     }
 
     /// Goes to where `at` bytes come before the next.
-    pub fn seek(&mut self, at: u64) -> Result<()> {
+    pub(super) fn seek(&mut self, at: u64) -> Result<()> {
         match usize::try_from(at) {
             Ok(at) if at <= self.bytes.len() => {
                 self.at = at;
@@ -39,7 +39,7 @@ impl<'a> Bytes<'a> {
     }
 
     /// The next bytes.
-    pub fn take(&mut self, count: usize) -> Result<&'a [u8]> {
+    pub(super) fn take(&mut self, count: usize) -> Result<&'a [u8]> {
         if count > self.left() {
             let (at, left) = (self.at, self.left());
             let what = format_args!("it has {left} bytes from byte {at} on and needs {count}");
@@ -54,41 +54,41 @@ impl<'a> Bytes<'a> {
         Ok(self.take(N)?.try_into().expect("as many as were asked for"))
     }
 
-    pub fn u8(&mut self) -> Result<u8> {
+    pub(super) fn u8(&mut self) -> Result<u8> {
         Ok(self.array::<1>()?[0])
     }
 
-    pub fn u32(&mut self) -> Result<u32> {
+    pub(super) fn u32(&mut self) -> Result<u32> {
         self.array().map(u32::from_le_bytes)
     }
 
-    pub fn u64(&mut self) -> Result<u64> {
+    pub(super) fn u64(&mut self) -> Result<u64> {
         self.array().map(u64::from_le_bytes)
     }
 
-    pub fn i32(&mut self) -> Result<i32> {
+    pub(super) fn i32(&mut self) -> Result<i32> {
         self.array().map(i32::from_le_bytes)
     }
 
-    pub fn i64(&mut self) -> Result<i64> {
+    pub(super) fn i64(&mut self) -> Result<i64> {
         self.array().map(i64::from_le_bytes)
     }
 
-    pub fn f32(&mut self) -> Result<f32> {
+    pub(super) fn f32(&mut self) -> Result<f32> {
         self.array().map(f32::from_le_bytes)
     }
 
-    pub fn f64(&mut self) -> Result<f64> {
+    pub(super) fn f64(&mut self) -> Result<f64> {
         self.array().map(f64::from_le_bytes)
     }
 
     /// The error that the file is not what it claims to be.
-    pub fn bad(&self, what: impl Display) -> Error {
+    pub(super) fn bad(&self, what: impl Display) -> Error {
         Error::invalid(self.place, what, "it is truncated or damaged: export it again")
     }
 
     /// The error that the file asks for what is not read.
-    pub fn unsupported(&self, what: impl Display, hint: impl Display) -> Error {
+    pub(super) fn unsupported(&self, what: impl Display, hint: impl Display) -> Error {
         Error::unsupported(self.place, what, hint)
     }
 }

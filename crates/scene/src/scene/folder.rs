@@ -60,7 +60,7 @@ pub(super) struct Found {
 
 impl Found {
     /// The file and its length in bytes.
-    pub fn into_file(self) -> (File, u64) {
+    pub(super) fn into_file(self) -> (File, u64) {
         self.file
     }
 
@@ -68,14 +68,14 @@ impl Found {
     ///
     /// # Errors
     /// As [`file::read`].
-    pub fn read(self) -> Result<Vec<u8>> {
+    pub(super) fn read(self) -> Result<Vec<u8>> {
         file::whole(self.file, &self.path)
     }
 }
 
 impl Folder {
     /// The folder of the scene's file at `scene`.
-    pub fn of(scene: &Path, allow_outside: bool) -> Self {
+    pub(super) fn of(scene: &Path, allow_outside: bool) -> Self {
         Folder {
             source: file_name(scene),
             path: scene.parent().unwrap_or(Path::new("")).to_path_buf(),
@@ -93,7 +93,7 @@ impl Folder {
     /// # Errors
     /// [`Error::Io`] where there is none, [`Error::Invalid`] where the name leads out of the
     /// folder and nothing inside is called so.
-    pub fn open(&self, name: &str) -> Result<Found> {
+    pub(super) fn open(&self, name: &str) -> Result<Found> {
         let spellings = spellings(name);
         let mut first = None;
         for spelling in &spellings {
@@ -127,12 +127,12 @@ impl Folder {
     }
 
     /// Whether there is a regular file of just that name.
-    pub fn has(&self, name: &str) -> bool {
+    pub(super) fn has(&self, name: &str) -> bool {
         spellings(name).iter().any(|spelling| self.open_exactly(spelling).is_ok())
     }
 
     /// What the user should know of the files that were opened.
-    pub fn tell(&self, scene: &mut Scene) {
+    pub(super) fn tell(&self, scene: &mut Scene) {
         scene.warnings.extend(self.notes.take());
     }
 

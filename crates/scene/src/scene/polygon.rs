@@ -60,7 +60,7 @@ impl Cutter {
     /// # Errors
     /// [`TooComplex`] where it has more than 65536 corners, or it and the polygons before it too
     /// many crossings, and is not covered by a fan from its first corner.
-    pub fn triangulate(&mut self, points: &[DVec3]) -> Result<Vec<[Corner; 3]>, TooComplex> {
+    pub(super) fn triangulate(&mut self, points: &[DVec3]) -> Result<Vec<[Corner; 3]>, TooComplex> {
         let fan = || (1..points.len().max(2) - 1).map(|i| [0, i, i + 1].map(Corner::Own)).collect();
         if points.len() <= 3 {
             return Ok(fan());

@@ -25,7 +25,7 @@ pub(super) struct Deviations {
 
 impl Deviations {
     /// Adds `pixels` of one deviation. More than one can be added once.
-    pub fn add(&mut self, deviation: f64, pixels: u64) {
+    pub(super) fn add(&mut self, deviation: f64, pixels: u64) {
         if pixels == 1 {
             self.single.push(deviation as f32);
         } else {
@@ -34,7 +34,7 @@ impl Deviations {
     }
 
     /// The distribution; `None` without pixels.
-    pub fn finish(mut self) -> Option<Temporal> {
+    pub(super) fn finish(mut self) -> Option<Temporal> {
         self.single.sort_unstable_by(f32::total_cmp);
         let (shared, times) = self.shared;
         let pixels = self.single.len() as u64 + times;

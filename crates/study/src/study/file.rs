@@ -157,36 +157,36 @@ mod defaults {
     use screendoor_rop::Implementation;
 
     /// Samples per pixel of the pictures that are kept, where there are so many.
-    pub const PICTURES: u32 = 8;
+    pub(super) const PICTURES: u32 = 8;
 
-    pub fn seeds() -> u32 {
+    pub(super) fn seeds() -> u32 {
         8
     }
-    pub fn engines() -> Vec<EngineName> {
+    pub(super) fn engines() -> Vec<EngineName> {
         vec![EngineName::Cpu(Implementation::Fast)]
     }
-    pub fn timing() -> u32 {
+    pub(super) fn timing() -> u32 {
         3
     }
-    pub fn metrics() -> Vec<Metric> {
+    pub(super) fn metrics() -> Vec<Metric> {
         vec![Metric::Flip, Metric::FlipHdr, Metric::Spectrum, Metric::Filtered]
     }
-    pub fn memory() -> u64 {
+    pub(super) fn memory() -> u64 {
         512
     }
-    pub fn size() -> [u32; 2] {
+    pub(super) fn size() -> [u32; 2] {
         [512, 512]
     }
-    pub fn order() -> Order {
+    pub(super) fn order() -> Order {
         Order::Api
     }
-    pub fn faces() -> Faces {
+    pub(super) fn faces() -> Faces {
         Faces::Material
     }
-    pub fn pattern() -> PatternKind {
+    pub(super) fn pattern() -> PatternKind {
         PatternKind::Auto
     }
-    pub fn captured() -> u32 {
+    pub(super) fn captured() -> u32 {
         64
     }
 }

@@ -59,7 +59,7 @@ fn builder<'a>() -> tempfile::Builder<'a, 'static> {
 
 impl Partial {
     /// Begins a file in `folder`.
-    pub fn create(folder: &Path) -> io::Result<(File, Partial)> {
+    pub(super) fn create(folder: &Path) -> io::Result<(File, Partial)> {
         sweep_once(folder);
         #[cfg(target_os = "linux")]
         if let Some(file) = unnamed::create(folder) {
@@ -82,7 +82,7 @@ impl Partial {
     }
 
     /// Gives the finished `file` its name `destination`, in the folder that it was begun in.
-    pub fn persist(mut self, file: &File, destination: &Path) -> io::Result<()> {
+    pub(super) fn persist(mut self, file: &File, destination: &Path) -> io::Result<()> {
         match &mut self {
             #[cfg(target_os = "linux")]
             Partial::Unnamed => {

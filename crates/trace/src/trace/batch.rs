@@ -104,7 +104,7 @@ macro_rules! batches {
         }
 
         impl BatchBuilder {
-            pub fn new(header: &Header) -> Result<Self> {
+            pub(super) fn new(header: &Header) -> Result<Self> {
                 Ok(BatchBuilder {
                     len: 0,
                     $($name: grow::<$type>(header, ColumnId::$id)?,)*
@@ -115,7 +115,7 @@ macro_rules! batches {
                 })
             }
 
-            pub fn len(&self) -> usize {
+            pub(super) fn len(&self) -> usize {
                 self.len
             }
 
@@ -125,7 +125,7 @@ macro_rules! batches {
             /// The column whose declared constant the fragment breaks, or which the header
             /// does not name though the fragment has a value of it.
             #[inline]
-            pub fn push(&mut self, f: &Fragment) -> Result<(), ColumnId> {
+            pub(super) fn push(&mut self, f: &Fragment) -> Result<(), ColumnId> {
                 $(if !<$type as Cells>::push(&mut self.$name, f.$($place)+) {
                     return Err(ColumnId::$id);
                 })*
@@ -141,7 +141,7 @@ macro_rules! batches {
             }
 
             /// The fragments so far as a batch; the builder is empty after.
-            pub fn take(&mut self) -> Batch {
+            pub(super) fn take(&mut self) -> Batch {
                 Batch {
                     len: std::mem::take(&mut self.len),
                     $($name: Cells::take(&mut self.$name),)*
@@ -249,7 +249,7 @@ mod check {
     }
 
     /// Every value of the column's type is good.
-    pub fn anything<C>(_: &C, _: &Header) -> Option<Bad> {
+    pub(super) fn anything<C>(_: &C, _: &Header) -> Option<Bad> {
         None
     }
 
@@ -260,15 +260,15 @@ mod check {
         bad(row, what, "write coordinates within the frame")
     }
 
-    pub fn within_width(column: &Column<u16>, header: &Header) -> Option<Bad> {
+    pub(super) fn within_width(column: &Column<u16>, header: &Header) -> Option<Bad> {
         within(column, header.width, "x lies outside the frame")
     }
 
-    pub fn within_height(column: &Column<u16>, header: &Header) -> Option<Bad> {
+    pub(super) fn within_height(column: &Column<u16>, header: &Header) -> Option<Bad> {
         within(column, header.height, "y lies outside the frame")
     }
 
-    pub fn some_samples(column: &CoverageColumn, header: &Header) -> Option<Bad> {
+    pub(super) fn some_samples(column: &CoverageColumn, header: &Header) -> Option<Bad> {
         let all = SampleMask::first(header.pattern.samples());
         let row = match column {
             CoverageColumn::U8(c) => stray(c.stored(), all),
@@ -280,12 +280,12 @@ mod check {
         bad(row, what, "a fragment covers at least one of its pixel's samples and no others")
     }
 
-    pub fn unit_interval(column: &Column<f32>, _: &Header) -> Option<Bad> {
+    pub(super) fn unit_interval(column: &Column<f32>, _: &Header) -> Option<Bad> {
         let row = first(column.stored(), |a| !(0.0..=1.0).contains(a));
         bad(row, "alpha is not in [0, 1]", "clamp alpha when writing")
     }
 
-    pub fn finite_colour(column: &ChannelColumn, _: &Header) -> Option<Bad> {
+    pub(super) fn finite_colour(column: &ChannelColumn, _: &Header) -> Option<Bad> {
         let row = match column {
             ChannelColumn::F16(c) => first(c.stored(), |v| !v.is_finite()),
             ChannelColumn::F32(c) => first(c.stored(), |v| !v.is_finite()),
@@ -295,7 +295,7 @@ mod check {
     }
 
     #[cfg(any(test, feature = "probe"))]
-    pub fn finite(column: &Column<f32>, _: &Header) -> Option<Bad> {
+    pub(super) fn finite(column: &Column<f32>, _: &Header) -> Option<Bad> {
         bad(first(column.stored(), |v| !v.is_finite()), "a number is not finite", "write numbers")
     }
 }

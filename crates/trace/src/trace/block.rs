@@ -19,7 +19,7 @@ pub const BLOCK: usize = 256;
 pub const STRETCH: usize = 16;
 
 /// A column of a block, with room for what a copy writes beyond its end.
-pub type Values<T> = [T; BLOCK + STRETCH];
+pub(super) type Values<T> = [T; BLOCK + STRETCH];
 
 /// Makes blocks of the table of columns.
 macro_rules! blocks {

@@ -19,7 +19,7 @@ pub(crate) struct ContentHasher {
 impl ContentHasher {
     /// A hasher for a file with this metadata of the schema and these columns, in the
     /// file's order.
-    pub fn new(
+    pub(super) fn new(
         metadata: &BTreeMap<String, String>,
         columns: impl Iterator<Item = ColumnId>,
     ) -> Self {
@@ -34,13 +34,13 @@ impl ContentHasher {
     }
 
     /// Adds the next values of `column`, as they are stored.
-    pub fn update(&mut self, column: ColumnId, values: &[u8]) {
+    pub(super) fn update(&mut self, column: ColumnId, values: &[u8]) {
         if let Some((_, hasher)) = self.columns.iter_mut().find(|(id, _)| *id == column) {
             hasher.update(values);
         }
     }
 
-    pub fn finish(mut self, rows: u64) -> String {
+    pub(super) fn finish(mut self, rows: u64) -> String {
         self.header.update(format!("rows={rows}\n").as_bytes());
         for (id, hasher) in self.columns {
             let line = format!("{}={}\n", id.name(), hasher.finalize().to_hex());

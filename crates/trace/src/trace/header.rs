@@ -120,18 +120,18 @@ const DEPTH_CONVENTION: &str = "unorm32 near=0 far=4294967295 less-equal";
 
 /// The metadata keys of the format, all under one prefix.
 mod key {
-    pub const VERSION: &str = "screendoor.version";
-    pub const WIDTH: &str = "screendoor.width";
-    pub const HEIGHT: &str = "screendoor.height";
-    pub const SAMPLES: &str = "screendoor.samples";
-    pub const POSITIONS: &str = "screendoor.positions";
-    pub const PATTERN: &str = "screendoor.pattern";
-    pub const NESTED: &str = "screendoor.nested";
-    pub const BACKGROUND: &str = "screendoor.background";
-    pub const DEPTH: &str = "screendoor.depth";
-    pub const SOURCE: &str = "screendoor.source";
-    pub const CAMERA: &str = "screendoor.camera";
-    pub const CONSTANT: &str = "screendoor.constant.";
+    pub(super) const VERSION: &str = "screendoor.version";
+    pub(super) const WIDTH: &str = "screendoor.width";
+    pub(super) const HEIGHT: &str = "screendoor.height";
+    pub(super) const SAMPLES: &str = "screendoor.samples";
+    pub(super) const POSITIONS: &str = "screendoor.positions";
+    pub(super) const PATTERN: &str = "screendoor.pattern";
+    pub(super) const NESTED: &str = "screendoor.nested";
+    pub(super) const BACKGROUND: &str = "screendoor.background";
+    pub(super) const DEPTH: &str = "screendoor.depth";
+    pub(super) const SOURCE: &str = "screendoor.source";
+    pub(super) const CAMERA: &str = "screendoor.camera";
+    pub(super) const CONSTANT: &str = "screendoor.constant.";
 }
 
 impl Header {

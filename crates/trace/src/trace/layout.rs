@@ -55,11 +55,11 @@ pub(crate) struct Block {
 }
 
 impl Block {
-    pub fn bytes(&self) -> usize {
+    pub(super) fn bytes(&self) -> usize {
         self.message_bytes + self.body_bytes
     }
 
-    pub fn end(&self) -> u64 {
+    pub(super) fn end(&self) -> u64 {
         self.offset + self.bytes() as u64
     }
 }
@@ -70,7 +70,7 @@ pub(crate) fn not_a_trace(place: &str, what: impl std::fmt::Display) -> Error {
 
 impl Layout {
     /// Reads the layout of the file whose bytes are `file`.
-    pub fn parse(file: &[u8], place: &str) -> Result<Self> {
+    pub(super) fn parse(file: &[u8], place: &str) -> Result<Self> {
         if file.starts_with(&CONTINUATION) {
             return stream::parse(file, place);
         }
@@ -135,7 +135,7 @@ impl Layout {
     }
 
     /// Where the last batch ends, or the head where there is none.
-    pub fn blocks_end(&self) -> u64 {
+    pub(super) fn blocks_end(&self) -> u64 {
         self.blocks.last().map_or(self.head_end, Block::end)
     }
 }
@@ -229,7 +229,7 @@ pub(crate) struct BatchLayout {
 impl BatchLayout {
     /// Reads and checks the message of a block, whose bytes are `bytes`, against
     /// the file's `columns`.
-    pub fn parse(
+    pub(super) fn parse(
         bytes: &[u8],
         block: &Block,
         columns: &StoredColumns,
@@ -304,7 +304,7 @@ impl BatchLayout {
 
     /// The bytes of `column`'s values, decompressed where they are compressed;
     /// `None` where the file does not store it. At least `rows` values long.
-    pub fn values(
+    pub(super) fn values(
         &self,
         column: ColumnId,
         block: &Buffer,

@@ -13,7 +13,7 @@ pub(super) struct MetadataReader<'a> {
 }
 
 impl MetadataReader<'_> {
-    pub fn text(&self, key: &str) -> Result<&str> {
+    pub(super) fn text(&self, key: &str) -> Result<&str> {
         self.map.get(key).map(String::as_str).ok_or_else(|| {
             Error::invalid(
                 self.place,
@@ -24,23 +24,23 @@ impl MetadataReader<'_> {
     }
 
     /// The error for an entry whose text is not what is `wanted`.
-    pub fn bad(&self, key: &str, wanted: &str) -> Error {
+    pub(super) fn bad(&self, key: &str, wanted: &str) -> Error {
         let text = self.map.get(key).map_or("", String::as_str);
         let text: String = text.chars().take(40).collect();
         self.wrong(key, format_args!("'{text}' is not {wanted}"))
     }
 
     /// The error for an entry of which `what` is wrong.
-    pub fn wrong(&self, key: &str, what: impl std::fmt::Display) -> Error {
+    pub(super) fn wrong(&self, key: &str, what: impl std::fmt::Display) -> Error {
         let place = format_args!("{}, metadata '{key}'", self.place).to_string();
         Error::invalid(place, what, "correct the writer of the trace (docs/TRACE_FORMAT.md)")
     }
 
-    pub fn parse<T: std::str::FromStr>(&self, key: &str, wanted: &str) -> Result<T> {
+    pub(super) fn parse<T: std::str::FromStr>(&self, key: &str, wanted: &str) -> Result<T> {
         self.text(key)?.parse().map_err(|_| self.bad(key, wanted))
     }
 
-    pub fn list<T>(
+    pub(super) fn list<T>(
         &self,
         key: &str,
         wanted: &str,

@@ -55,11 +55,11 @@ pub(crate) struct Seal {
 
 impl Seal {
     /// Whether the footer holds any entry of a seal.
-    pub fn is_in(map: &BTreeMap<String, String>) -> bool {
+    pub(super) fn is_in(map: &BTreeMap<String, String>) -> bool {
         [ROWS, BLOCKS, CONTENT, TAIL, SEAL].iter().any(|key| map.contains_key(*key))
     }
 
-    pub fn to_metadata(&self) -> BTreeMap<String, String> {
+    pub(super) fn to_metadata(&self) -> BTreeMap<String, String> {
         let blocks: Vec<String> =
             self.blocks.iter().map(|b| format!("{}:{}:{:08x}", b.rows, b.end, b.crc)).collect();
         let mut map: BTreeMap<String, String> = [
@@ -77,7 +77,7 @@ impl Seal {
         map
     }
 
-    pub fn from_metadata(map: &BTreeMap<String, String>, place: &str) -> Result<Self> {
+    pub(super) fn from_metadata(map: &BTreeMap<String, String>, place: &str) -> Result<Self> {
         let bad = |key: &str| damaged(place, format_args!("its footer's '{key}' does not hold"));
         let text = |key: &str| map.get(key).map(String::as_str).ok_or_else(|| bad(key));
         let tail = match map.get(TAIL) {
@@ -113,7 +113,7 @@ impl Seal {
     }
 
     /// Holds `tail`, the bytes after the last block, to their checksum.
-    pub fn check_tail(&self, tail: &[u8], place: &str) -> Result<()> {
+    pub(super) fn check_tail(&self, tail: &[u8], place: &str) -> Result<()> {
         let Some(stored) = self.tail else { return Ok(()) };
         let found = masked_places(tail).map(|places| crc_of_tail(tail, &places));
         if found == Some(stored) {
@@ -182,7 +182,7 @@ pub(crate) struct SealingWriter<W> {
 }
 
 impl<W: Write> SealingWriter<W> {
-    pub fn new(inner: W) -> Self {
+    pub(super) fn new(inner: W) -> Self {
         SealingWriter {
             inner,
             written: 0,
@@ -193,14 +193,14 @@ impl<W: Write> SealingWriter<W> {
     }
 
     /// Ends a block of `rows` rows at the bytes written so far.
-    pub fn end_block(&mut self, rows: u64) {
+    pub(super) fn end_block(&mut self, rows: u64) {
         let crc = std::mem::take(&mut self.crc).finalize();
         self.blocks.push(SealedBlock { rows, end: self.written, crc });
     }
 
     /// Begins the tail; what is returned are the footer's entries, two of which
     /// [`SealingWriter::finish`] fills in.
-    pub fn begin_tail(&mut self, rows: u64, content: String) -> BTreeMap<String, String> {
+    pub(super) fn begin_tail(&mut self, rows: u64, content: String) -> BTreeMap<String, String> {
         let blocks = std::mem::take(&mut self.blocks);
         let seal = Seal { blocks, rows, content, tail: Some(0) };
         let entries = seal.to_metadata();
@@ -209,7 +209,7 @@ impl<W: Write> SealingWriter<W> {
     }
 
     /// Seals the tail and passes it on; the sink, and the bytes before the tail.
-    pub fn finish(mut self) -> io::Result<(W, u64)> {
+    pub(super) fn finish(mut self) -> io::Result<(W, u64)> {
         if let Some((mut seal, mut tail)) = self.tail {
             let places = masked_places(&tail).expect("the footer holds its own entries");
             seal.tail = Some(crc_of_tail(&tail, &places));

@@ -12,7 +12,7 @@ use crate::trace::ties::{self, Counts};
 /// Objects beyond this many are counted as one remainder.
 const MAX_OBJECTS: usize = 1 << 16;
 /// Bins of the alpha histogram over [0, 1].
-pub const ALPHA_BINS: usize = 10;
+pub(super) const ALPHA_BINS: usize = 10;
 
 /// A trace in numbers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

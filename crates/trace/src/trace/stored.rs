@@ -30,7 +30,7 @@ pub(crate) enum StoredType {
 }
 
 impl StoredType {
-    pub fn bytes(self) -> usize {
+    pub(super) fn bytes(self) -> usize {
         let (StoredType::Unsigned(bytes) | StoredType::Signed(bytes) | StoredType::Real(bytes)) =
             self;
         bytes
@@ -135,7 +135,7 @@ pub(crate) struct StoredColumns {
 
 impl StoredColumns {
     /// The columns of a schema's fields.
-    pub fn of<'a>(fields: impl Iterator<Item = Field<'a>>, place: &str) -> Result<Self> {
+    pub(super) fn of<'a>(fields: impl Iterator<Item = Field<'a>>, place: &str) -> Result<Self> {
         let mut columns = StoredColumns::default();
         for field in fields {
             let name = field.name().unwrap_or("");
@@ -160,7 +160,11 @@ impl StoredColumns {
     /// Holds the columns against the header: each is stored with a type that can be read,
     /// or is constant, and not both. Tells as which type each is read, and the header of
     /// which precision colours are.
-    pub fn complete(&self, header: &mut Header, place: &str) -> Result<Vec<(ColumnId, ValueType)>> {
+    pub(super) fn complete(
+        &self,
+        header: &mut Header,
+        place: &str,
+    ) -> Result<Vec<(ColumnId, ValueType)>> {
         let samples = header.pattern.samples();
         for id in ColumnId::ALL {
             let stored = self.list.iter().any(|column| column.id == id);
@@ -195,13 +199,13 @@ impl StoredColumns {
 
 impl StoredColumn {
     /// Whether it is stored in this type.
-    pub fn is(&self, value_type: ValueType) -> bool {
+    pub(super) fn is(&self, value_type: ValueType) -> bool {
         self.stored == StoredType::of(value_type)
     }
 
     /// The column's `rows` values as `to`, which it can be read as; `values` are the
     /// bytes of at least as many. Without a copy where they are of that type.
-    pub fn convert(
+    pub(super) fn convert(
         &self,
         to: ValueType,
         values: Buffer,
@@ -305,7 +309,7 @@ impl Shape {
 
     /// Where a column's own arrays and buffers begin in a batch whose views have so many
     /// more buffers each.
-    pub fn buffer(&self, views: &[usize]) -> Option<usize> {
+    pub(super) fn buffer(&self, views: &[usize]) -> Option<usize> {
         let more = views.get(..self.views)?.iter();
         more.chain(iter::once(&self.buffers)).try_fold(0_usize, |sum, n| sum.checked_add(*n))
     }

@@ -62,17 +62,17 @@ pub(super) fn changed(place: &str) -> Error {
 
 impl StoredFile {
     /// `file`, as its `metadata` were when it was opened.
-    pub fn new(file: File, metadata: &Metadata) -> Self {
+    pub(super) fn new(file: File, metadata: &Metadata) -> Self {
         StoredFile { file, was: state(metadata), idle: Arc::default() }
     }
 
     /// The file.
-    pub fn file(&self) -> &File {
+    pub(super) fn file(&self) -> &File {
         &self.file
     }
 
     /// Whether it was written to since it was opened.
-    pub fn has_changed(&self) -> bool {
+    pub(super) fn has_changed(&self) -> bool {
         self.file.metadata().is_ok_and(|now| state(&now) != self.was)
     }
 
@@ -81,7 +81,7 @@ impl StoredFile {
     /// # Errors
     /// [`Error::Io`] where they cannot be read; [`Error::Invalid`] where they are not there
     /// any more.
-    pub fn bytes(&self, place: &str, offset: u64, length: usize) -> Result<Bytes> {
+    pub(super) fn bytes(&self, place: &str, offset: u64, length: usize) -> Result<Bytes> {
         let idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner).take();
         let mut buffer = idle.unwrap_or_default();
         // What is in it is written over; only what it grows by is cleared.

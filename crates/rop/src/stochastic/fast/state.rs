@@ -48,7 +48,7 @@ pub(super) type PlainPixel<F, const N: usize> =
     OverOpaquePixel<MethodsPixel<<<F as FastSampler<N>>::Plain as Sampler<N>>::State, N>, N>;
 
 impl<W: Width> SampleRows<W> {
-    pub fn cleared(frame: &Frame) -> Self {
+    pub(super) fn cleared(frame: &Frame) -> Self {
         let far = (Unorm32::FAR.0 ^ SIGN) as i32;
         SampleRows {
             depth: W::row(|_| far),

@@ -6,7 +6,7 @@ use crate::contract::event::{EventCounts, Probe};
 use screendoor_trace::trace::MAX_SAMPLES;
 
 /// Sorts by their length.
-pub type Lengths = [u64; MAX_SAMPLES as usize + 1];
+pub(super) type Lengths = [u64; MAX_SAMPLES as usize + 1];
 
 /// Counts what a kernel does, if `P` listens. What follows from these counts, such as
 /// the bits of state, is worked out once at the end.

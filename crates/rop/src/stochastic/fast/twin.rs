@@ -12,7 +12,7 @@ use screendoor_trace::tile::TileGrid;
 use screendoor_trace::trace::{Fragment, SampleMask};
 
 /// Words that every fragment of a replay needs.
-pub struct Constants<W: Width> {
+pub(super) struct Constants<W: Width> {
     offsets: [W::Row; 2],
     reversed: W::Row,
     lanes: W::Row,

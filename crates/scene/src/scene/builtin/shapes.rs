@@ -23,12 +23,12 @@ impl Solid {
     /// Joins rings of equally many points, each to the next and, where `cyclic`,
     /// the last to the first. The outside is where the points of a ring go around
     /// counter-clockwise as seen from the next ring.
-    pub fn loft(rings: &[Vec<Vec3>], cyclic: bool) -> Self {
+    pub(super) fn loft(rings: &[Vec<Vec3>], cyclic: bool) -> Self {
         Self::join(rings, cyclic, true)
     }
 
     /// Joins rows of equally many points, each to the next.
-    pub fn sheet(rows: &[Vec<Vec3>]) -> Self {
+    pub(super) fn sheet(rows: &[Vec<Vec3>]) -> Self {
         Self::join(rows, false, false)
     }
 
@@ -54,13 +54,13 @@ impl Solid {
 
     /// Turns a section around the z axis: `profile` holds (radius, z), upwards
     /// along the outside; `cyclic` closes the section.
-    pub fn lathe(sides: usize, profile: &[[f32; 2]], cyclic: bool) -> Self {
+    pub(super) fn lathe(sides: usize, profile: &[[f32; 2]], cyclic: bool) -> Self {
         Self::wheel(&circle(sides, 1.0), 0.0, profile, cyclic)
     }
 
     /// As [`Solid::lathe`], but instead of a radius the profile holds the share of
     /// the way from a circle of radius `hub` to the outline.
-    pub fn wheel(outline: &[Vec2], hub: f32, profile: &[[f32; 2]], cyclic: bool) -> Self {
+    pub(super) fn wheel(outline: &[Vec2], hub: f32, profile: &[[f32; 2]], cyclic: bool) -> Self {
         let ring = |[share, z]: &[f32; 2]| {
             let point = |p: &Vec2| (p.normalize_or_zero() * hub).lerp(*p, *share).extend(*z);
             outline.iter().map(point).collect()
@@ -70,7 +70,7 @@ impl Solid {
 
     /// A plate of an outline around the origin between two heights, in `steps`
     /// rings from its middle to its edge; with a round hole where `hub` > 0.
-    pub fn plate(outline: &[Vec2], hub: f32, [low, high]: [f32; 2], steps: usize) -> Self {
+    pub(super) fn plate(outline: &[Vec2], hub: f32, [low, high]: [f32; 2], steps: usize) -> Self {
         let share = |i: usize| i as f32 / steps as f32;
         let up = (0..=steps).map(|i| [share(i), low]);
         let profile: Vec<_> = up.chain((0..=steps).rev().map(|i| [share(i), high])).collect();
@@ -79,7 +79,7 @@ impl Solid {
 
     /// A box with rounded corners along z: `section` holds how far its sides lie
     /// within `half`, and z, upwards along the outside.
-    pub fn shell(half: [f32; 2], corner: f32, sides: usize, section: &[[f32; 2]]) -> Self {
+    pub(super) fn shell(half: [f32; 2], corner: f32, sides: usize, section: &[[f32; 2]]) -> Self {
         let outline = rounded(half, corner, sides);
         let half = Vec2::from_array(half);
         let ring = |[inset, z]: &[f32; 2]| {
@@ -91,7 +91,7 @@ impl Solid {
 
     /// Moves a section along a path. The section's x axis starts along `axis` and
     /// follows the bends without twisting; `section` gives it for each point.
-    pub fn sweep(
+    pub(super) fn sweep(
         path: &[Vec3],
         cyclic: bool,
         axis: Vec3,
@@ -118,12 +118,12 @@ impl Solid {
     }
 
     /// A tube of one radius along a path, open at its ends.
-    pub fn tube(path: &[Vec3], radius: f32, sides: usize) -> Self {
+    pub(super) fn tube(path: &[Vec3], radius: f32, sides: usize) -> Self {
         Self::sweep(path, false, Vec3::X, |_| circle(sides, radius))
     }
 
     /// This and another.
-    pub fn and(mut self, other: Solid) -> Self {
+    pub(super) fn and(mut self, other: Solid) -> Self {
         let first = self.points.len() as u32;
         self.points.extend(other.points);
         self.triangles.extend(other.triangles.iter().map(|t| t.map(|i| i + first)));
@@ -131,23 +131,23 @@ impl Solid {
     }
 
     /// The same at another place.
-    pub fn placed(self, place: &DAffine3) -> Self {
+    pub(super) fn placed(self, place: &DAffine3) -> Self {
         self.bent(|p| place.transform_point3(p.as_dvec3()).as_vec3())
     }
 
     /// The same with each of its points put elsewhere.
-    pub fn bent(mut self, place: impl Fn(Vec3) -> Vec3) -> Self {
+    pub(super) fn bent(mut self, place: impl Fn(Vec3) -> Vec3) -> Self {
         self.points.iter_mut().for_each(|p| *p = place(*p));
         self
     }
 
     /// The same moved along.
-    pub fn moved(self, x: f32, y: f32, z: f32) -> Self {
+    pub(super) fn moved(self, x: f32, y: f32, z: f32) -> Self {
         self.placed(&DAffine3::from_translation(Vec3::new(x, y, z).as_dvec3()))
     }
 
     /// The mesh: smooth across shallow edges, creased along sharp ones.
-    pub fn mesh(&self, material: usize) -> Mesh {
+    pub(super) fn mesh(&self, material: usize) -> Mesh {
         let triangles = self.welded();
         let faces: Vec<Vec3> = triangles.iter().map(|t| self.area(t)).collect();
         let units: Vec<Vec3> = faces.iter().map(|f| f.normalize_or_zero()).collect();

@@ -107,12 +107,12 @@ pub(super) struct Numbers {
 
 impl Numbers {
     /// How many elements there are.
-    pub fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.numbers.len() / self.width
     }
 
     /// The elements, each made of its first numbers, and of `rest` where it has fewer.
-    pub fn arrays<const N: usize>(&self, rest: f32) -> impl Iterator<Item = [f32; N]> {
+    pub(super) fn arrays<const N: usize>(&self, rest: f32) -> impl Iterator<Item = [f32; N]> {
         let element = move |e: &[f32]| std::array::from_fn(|i| e.get(i).copied().unwrap_or(rest));
         self.numbers.chunks_exact(self.width).map(element)
     }

@@ -14,18 +14,18 @@ impl Extensions {
     ///
     /// # Errors
     /// Why it cannot be understood.
-    pub fn get<'a, T: Deserialize<'a>>(&'a self, name: &str) -> Result<Option<T>, String> {
+    pub(super) fn get<'a, T: Deserialize<'a>>(&'a self, name: &str) -> Result<Option<T>, String> {
         let said = self.0.get(name).filter(|said| !said.is_null());
         said.map(T::deserialize).transpose().map_err(|e| format!("its {name}: {e}"))
     }
 
     /// Whether it has the extension of that name.
-    pub fn has(&self, name: &str) -> bool {
+    pub(super) fn has(&self, name: &str) -> bool {
         self.0.contains_key(name)
     }
 
     /// The names of its extensions.
-    pub fn names(&self) -> impl Iterator<Item = &str> {
+    pub(super) fn names(&self) -> impl Iterator<Item = &str> {
         self.0.keys().map(String::as_str)
     }
 }

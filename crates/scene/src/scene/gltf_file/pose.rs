@@ -180,7 +180,7 @@ impl Bound<'_> {
     /// How vertex `i` is moved; `None` where it is bound to a joint that is not there.
     /// Weights are taken as shares of their sum; a vertex without any follows the first
     /// joint.
-    pub fn at(&self, i: usize) -> Option<DAffine3> {
+    pub(super) fn at(&self, i: usize) -> Option<DAffine3> {
         let mut moved = DAffine3 { matrix3: DMat3::ZERO, translation: DVec3::ZERO };
         let mut sum = 0.0;
         for Set { joints, weights } in &self.sets {

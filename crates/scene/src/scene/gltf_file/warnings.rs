@@ -21,22 +21,22 @@ pub(super) type Matter = usize;
 
 impl Warnings {
     /// Nothing yet of the file at `place`.
-    pub fn new(place: &str) -> Self {
+    pub(super) fn new(place: &str) -> Self {
         Warnings { place: place.to_string(), ..Warnings::default() }
     }
 
     /// The matter of the file that is told as `what`, which concerns no triangle yet.
-    pub fn matter(&mut self, what: impl std::fmt::Display) -> Matter {
+    pub(super) fn matter(&mut self, what: impl std::fmt::Display) -> Matter {
         self.matter_of("triangle", what)
     }
 
     /// The same of what is counted in other units: points, lines.
-    pub fn matter_of(&mut self, unit: &'static str, what: impl std::fmt::Display) -> Matter {
+    pub(super) fn matter_of(&mut self, unit: &'static str, what: impl std::fmt::Display) -> Matter {
         self.whole(unit, format!("{}: {what}", self.place))
     }
 
     /// The same, where `error` names the file.
-    pub fn error(&mut self, error: &Error) -> Matter {
+    pub(super) fn error(&mut self, error: &Error) -> Matter {
         self.whole("triangle", error.to_string())
     }
 
@@ -50,12 +50,15 @@ impl Warnings {
     }
 
     /// The matters of extensions by these names: of those that are not read.
-    pub fn extensions<'n>(&mut self, names: impl IntoIterator<Item = &'n str>) -> Vec<Matter> {
+    pub(super) fn extensions<'n>(
+        &mut self,
+        names: impl IntoIterator<Item = &'n str>,
+    ) -> Vec<Matter> {
         self.extensions_of("triangle", names)
     }
 
     /// The same of what is counted in other units.
-    pub fn extensions_of<'n>(
+    pub(super) fn extensions_of<'n>(
         &mut self,
         unit: &'static str,
         names: impl IntoIterator<Item = &'n str>,
@@ -72,7 +75,7 @@ impl Warnings {
     }
 
     /// Tells that so many triangles are drawn, or left out, to which these matters apply.
-    pub fn concerns(&mut self, matters: impl IntoIterator<Item = Matter>, items: usize) {
+    pub(super) fn concerns(&mut self, matters: impl IntoIterator<Item = Matter>, items: usize) {
         for matter in matters.into_iter().collect::<BTreeSet<_>>() {
             let count = &mut self.entries[matter].1;
             *count = count.saturating_add(items as u64);
@@ -80,7 +83,7 @@ impl Warnings {
     }
 
     /// The warnings, in the order in which their matters were found.
-    pub fn warnings(self) -> impl Iterator<Item = String> {
+    pub(super) fn warnings(self) -> impl Iterator<Item = String> {
         self.entries.into_iter().map(|(text, count, unit)| {
             let s = if count == 1 { "" } else { "s" };
             format!("{text} ({count} {unit}{s})")

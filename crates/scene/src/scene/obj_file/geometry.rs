@@ -78,7 +78,7 @@ pub(super) struct Reader<'f, 's> {
 
 impl<'f, 's> Reader<'f, 's> {
     /// One for the file at `path`; materials and warnings go to `scene`.
-    pub fn new(path: &'f Path, folder: &'f Folder, scene: &'s mut Scene) -> Self {
+    pub(super) fn new(path: &'f Path, folder: &'f Folder, scene: &'s mut Scene) -> Self {
         let unnamed = Segment { name: "unnamed_object".to_string(), ..Segment::default() };
         Reader {
             path,
@@ -108,7 +108,7 @@ impl<'f, 's> Reader<'f, 's> {
     ///
     /// # Errors
     /// [`Error::Io`], and [`Error::Invalid`] for the first statement that is wrong.
-    pub fn read(&mut self, mut lines: Lines) -> Result<()> {
+    pub(super) fn read(&mut self, mut lines: Lines) -> Result<()> {
         while let Some(statement) = lines.next()? {
             self.take(&statement).map_err(|what| self.wrong(statement.place(self.path), what))?;
         }
@@ -289,7 +289,7 @@ impl<'f, 's> Reader<'f, 's> {
     }
 
     /// What was read, once the scene's user has been told what was not.
-    pub fn finish(mut self) -> (Geometry, Library<'f>) {
+    pub(super) fn finish(mut self) -> (Geometry, Library<'f>) {
         let source = self.scene.source.clone();
         let mut warn = |what: String| self.scene.warnings.push(format!("{source}{what}"));
         // Where an MTL file is missing, it has been said.

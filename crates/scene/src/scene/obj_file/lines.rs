@@ -22,17 +22,17 @@ pub(super) struct Statement {
 
 impl Statement {
     /// Its first word.
-    pub fn keyword(&self) -> &str {
+    pub(super) fn keyword(&self) -> &str {
         self.text.split_whitespace().next().unwrap_or("")
     }
 
     /// What follows the first word, as a name: names may hold spaces and `#`.
-    pub fn name(&self) -> &str {
+    pub(super) fn name(&self) -> &str {
         self.text.split_once(char::is_whitespace).map_or("", |(_, rest)| rest.trim())
     }
 
     /// The words after the first, up to a comment.
-    pub fn words(&self) -> impl Iterator<Item = &str> {
+    pub(super) fn words(&self) -> impl Iterator<Item = &str> {
         self.text.split_whitespace().skip(1).take_while(|word| !word.starts_with('#'))
     }
 
@@ -40,7 +40,7 @@ impl Statement {
     ///
     /// # Errors
     /// What is wrong with it.
-    pub fn number(word: &str) -> Result<f64, String> {
+    pub(super) fn number(word: &str) -> Result<f64, String> {
         match word.parse::<f64>() {
             Ok(number) if number.is_finite() => Ok(number),
             Ok(_) => Err(format!("'{}' is no finite number", shown(word))),
@@ -49,7 +49,7 @@ impl Statement {
     }
 
     /// Where it stands in the file at `path`, and its beginning.
-    pub fn place(&self, path: &Path) -> String {
+    pub(super) fn place(&self, path: &Path) -> String {
         format!("{}, line {} ('{}')", path.display(), self.line, shown(&self.text))
     }
 }
@@ -74,7 +74,7 @@ impl Lines {
     ///
     /// # Errors
     /// [`Error::Io`], and [`Error::Unsupported`] for UTF-16 of more than 1 GiB.
-    pub fn of(file: File, path: &Path) -> Result<Self> {
+    pub(super) fn of(file: File, path: &Path) -> Result<Self> {
         let fail = |e| Error::io("read", path, e);
         let mut reader = BufReader::new(file);
         let start = reader.fill_buf().map_err(fail)?;
@@ -95,7 +95,7 @@ impl Lines {
     ///
     /// # Errors
     /// [`Error::Io`], and [`Error::Invalid`] for a statement above 16 MiB.
-    pub fn next(&mut self) -> Result<Option<Statement>> {
+    pub(super) fn next(&mut self) -> Result<Option<Statement>> {
         loop {
             let Some(mut text) = self.read_line()? else { return Ok(None) };
             let line = self.line;
@@ -181,7 +181,7 @@ fn utf16(reader: impl Read, unit: fn([u8; 2]) -> u16, path: &Path) -> Result<Str
 #[cfg(test)]
 impl Statement {
     /// A statement of that text.
-    pub fn of(text: &str) -> Self {
+    pub(super) fn of(text: &str) -> Self {
         Statement { line: 1, text: text.to_string() }
     }
 }

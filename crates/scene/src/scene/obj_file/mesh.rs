@@ -29,7 +29,7 @@ pub(super) struct Builder<'a> {
 
 impl<'a> Builder<'a> {
     /// One for the file called `place`.
-    pub fn new(place: &'a str, geometry: &'a Geometry) -> Self {
+    pub(super) fn new(place: &'a str, geometry: &'a Geometry) -> Self {
         let linear = |c: f32| srgb::decode(f64::from(c.clamp(0.0, 1.0))) as f32;
         let colour = |c: &Vec4| c.truncate().map(linear).extend(c.w.clamp(0.0, 1.0));
         Builder {
@@ -46,7 +46,7 @@ impl<'a> Builder<'a> {
     ///
     /// # Errors
     /// [`Error::Unsupported`] for a polygon that is too complex.
-    pub fn mesh(&mut self, segment: &Segment, end: usize) -> Result<Mesh> {
+    pub(super) fn mesh(&mut self, segment: &Segment, end: usize) -> Result<Mesh> {
         let mut mesh = Mesh::default();
         let mut known = HashMap::new();
         let faces = &self.geometry.faces;

@@ -101,7 +101,7 @@ struct Left {
 
 impl<'a> Library<'a> {
     /// An empty one for an OBJ file in `folder`.
-    pub fn new(folder: &'a Folder) -> Self {
+    pub(super) fn new(folder: &'a Folder) -> Self {
         Library {
             folder,
             numbers: HashMap::new(),
@@ -114,7 +114,7 @@ impl<'a> Library<'a> {
     }
 
     /// The number in the scene of the material of that name, and whether it is spelt so.
-    pub fn find(&self, name: &str) -> Option<(usize, bool)> {
+    pub(super) fn find(&self, name: &str) -> Option<(usize, bool)> {
         if let Some(number) = self.numbers.get(name) {
             return Some((*number, true));
         }
@@ -124,7 +124,7 @@ impl<'a> Library<'a> {
 
     /// Reads the files that a `mtllib` statement names: one whose name may hold
     /// spaces, or several. What cannot be read becomes warnings.
-    pub fn read(&mut self, names: &str, scene: &mut Scene) {
+    pub(super) fn read(&mut self, names: &str, scene: &mut Scene) {
         let words = words(names);
         if words.is_empty() {
             scene.warnings.push(format!("{}: a mtllib statement names no file", scene.source));
@@ -294,7 +294,7 @@ impl<'a> Library<'a> {
 
     /// Warns of materials in use that are said to be wholly transparent: some exporters write
     /// `Tr 1` for opaque.
-    pub fn warn_of_clear(&self, scene: &mut Scene) {
+    pub(super) fn warn_of_clear(&self, scene: &mut Scene) {
         let name =
             |o: &crate::scene::Object| &*scene.materials[scene.shapes[o.shape].material()].name;
         let clear: BTreeSet<&str> =

@@ -14,7 +14,7 @@ pub(super) struct Unread(BTreeMap<String, (usize, usize)>);
 
 impl Unread {
     /// Counts a word that stands in that line.
-    pub fn add(&mut self, word: &str, line: usize) {
+    pub(super) fn add(&mut self, word: &str, line: usize) {
         if let Some((_, count)) = self.0.get_mut(word) {
             *count += 1;
         } else if self.0.len() < MAX_WORDS {
@@ -23,7 +23,7 @@ impl Unread {
     }
 
     /// The words, as a warning names them; `None` where there are none.
-    pub fn named(&self) -> Option<String> {
+    pub(super) fn named(&self) -> Option<String> {
         let mut words: Vec<_> = self.0.iter().collect();
         words.sort_by_key(|(_, (line, _))| *line);
         let more = words.len().saturating_sub(MAX_NAMED);

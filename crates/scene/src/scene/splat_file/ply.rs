@@ -23,12 +23,12 @@ pub(super) struct Element<'a> {
 
 impl Element<'_> {
     /// Where in a row a property of one type stands; `None` where it is not there.
-    pub fn column(&self, name: &str, scalar: &ScalarType) -> Option<usize> {
+    pub(super) fn column(&self, name: &str, scalar: &ScalarType) -> Option<usize> {
         self.columns.iter().find(|(n, s, _)| n == name && s == scalar).map(|(_, _, at)| *at)
     }
 
     /// The four bytes at `column` of row `row`.
-    pub fn word(&self, row: usize, column: usize) -> [u8; 4] {
+    pub(super) fn word(&self, row: usize, column: usize) -> [u8; 4] {
         let at = row * self.stride + column;
         self.rows[at..at + 4].try_into().expect("four bytes")
     }

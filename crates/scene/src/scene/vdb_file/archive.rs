@@ -35,7 +35,7 @@ pub(super) struct Grid {
 
 impl Grid {
     /// Whether it says that it holds distances to a surface.
-    pub fn is_level_set(&self) -> bool {
+    pub(super) fn is_level_set(&self) -> bool {
         self.class == "level set"
     }
 }

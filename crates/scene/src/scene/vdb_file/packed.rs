@@ -19,17 +19,17 @@ impl Packing {
     const BLOSC: u32 = 4;
 
     /// `None` for flags that are not known.
-    pub fn from_flags(flags: u32) -> Option<Self> {
+    pub(super) fn from_flags(flags: u32) -> Option<Self> {
         (flags & !(Self::ZIP | Self::ACTIVE_MASK | Self::BLOSC) == 0).then_some(Packing(flags))
     }
 
     /// Whether only active values are stored.
-    pub fn active_only(self) -> bool {
+    pub(super) fn active_only(self) -> bool {
         self.0 & Self::ACTIVE_MASK != 0
     }
 
     /// Reads a block of `length` bytes.
-    pub fn read(self, bytes: &mut Bytes, length: usize) -> Result<Vec<u8>> {
+    pub(super) fn read(self, bytes: &mut Bytes, length: usize) -> Result<Vec<u8>> {
         if self.0 & (Self::BLOSC | Self::ZIP) == 0 {
             return Ok(bytes.take(length)?.to_vec());
         }

@@ -82,7 +82,7 @@ pub(super) struct Contrast {
 }
 
 impl Contrast {
-    pub fn new(pixels_per_degree: f64) -> Self {
+    pub(super) fn new(pixels_per_degree: f64) -> Self {
         let matrix = to_relative_xyz();
         let to_xyz = rows(matrix);
         let green = hunt_lab(times(&to_xyz, [0.0, 1.0, 0.0]));
@@ -96,7 +96,7 @@ impl Contrast {
     }
 
     /// What the eye resolves of [`opponent`] colours, as Hunt-adjusted CIELAB.
-    pub fn filtered_lab(&self, opponent: Planes, size: Size) -> Planes {
+    pub(super) fn filtered_lab(&self, opponent: Planes, size: Size) -> Planes {
         let mut planes = [0, 1, 2].map(|c| {
             let filtered = self.kernels[c]
                 .iter()
@@ -115,7 +115,7 @@ impl Contrast {
 
     /// The difference of two Hunt-adjusted colours, in [0, 1].
     #[inline]
-    pub fn difference(&self, a: [f32; 3], b: [f32; 3]) -> f32 {
+    pub(super) fn difference(&self, a: [f32; 3], b: [f32; 3]) -> f32 {
         let distance = hyab(a, b);
         if distance == 0.0 {
             return 0.0;

@@ -19,7 +19,7 @@ pub(super) struct Exposure(Option<f32>);
 
 impl Exposure {
     /// The picture at this exposure, in [0, 1].
-    pub fn show(self, linear: &Planes) -> Planes {
+    pub(super) fn show(self, linear: &Planes) -> Planes {
         let mapped = |v: f32| match self.0 {
             None => v.min(1.0),
             Some(factor) => tone_map(v * factor),

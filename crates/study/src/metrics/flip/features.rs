@@ -14,7 +14,7 @@ pub(super) struct Features {
 }
 
 impl Features {
-    pub fn new(pixels_per_degree: f64) -> Self {
+    pub(super) fn new(pixels_per_degree: f64) -> Self {
         let deviation = 0.5 * WIDTH * pixels_per_degree;
         let reach = (3.0 * deviation).ceil() as usize;
         let gaussian = |k: usize| libm::exp(-((k * k) as f64) / (2.0 * deviation * deviation));
@@ -42,7 +42,7 @@ impl Features {
     }
 
     /// The strength of edges and of points in `luminance`, which lies in [0, 1].
-    pub fn of(&self, luminance: &[f32], size: Size) -> (Vec<f32>, Vec<f32>) {
+    pub(super) fn of(&self, luminance: &[f32], size: Size) -> (Vec<f32>, Vec<f32>) {
         let across = self.smooth.along_rows(luminance, size);
         let strength = |kernel: &Kernel| {
             let x = self.smooth.along_columns(&kernel.along_rows(luminance, size), size);

@@ -8,7 +8,7 @@ pub(super) struct Size {
 }
 
 impl Size {
-    pub fn pixels(self) -> usize {
+    pub(super) fn pixels(self) -> usize {
         self.width * self.height
     }
 }
@@ -24,19 +24,19 @@ pub(super) struct Kernel {
 impl Kernel {
     /// The kernel of `half`, equal on both sides. Outer taps that are nothing beside
     /// the middle one in single precision are left out.
-    pub fn even(half: &[f64]) -> Self {
+    pub(super) fn even(half: &[f64]) -> Self {
         let first = half.first().copied().unwrap_or(0.0).abs();
         let kept = half.iter().rposition(|t| t.abs() > 1e-8 * first).map_or(1, |last| last + 1);
         Kernel { taps: half.iter().take(kept).map(|t| *t as f32).collect(), odd: false }
     }
 
     /// The kernel whose other side has the opposite sign.
-    pub fn odd(half: &[f64]) -> Self {
+    pub(super) fn odd(half: &[f64]) -> Self {
         Kernel { taps: half.iter().map(|t| *t as f32).collect(), odd: true }
     }
 
     /// `plane` filtered along its rows.
-    pub fn along_rows(&self, plane: &[f32], size: Size) -> Vec<f32> {
+    pub(super) fn along_rows(&self, plane: &[f32], size: Size) -> Vec<f32> {
         let mut result = vec![0.0; plane.len()];
         if plane.is_empty() {
             return result;
@@ -58,7 +58,7 @@ impl Kernel {
     }
 
     /// `plane` filtered along its columns.
-    pub fn along_columns(&self, plane: &[f32], size: Size) -> Vec<f32> {
+    pub(super) fn along_columns(&self, plane: &[f32], size: Size) -> Vec<f32> {
         let mut result = vec![0.0; plane.len()];
         if plane.is_empty() {
             return result;

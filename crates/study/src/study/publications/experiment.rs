@@ -45,18 +45,18 @@ pub(in crate::study) mod studies {
         };
     }
 
-    pub const COMPARISON: &str = study!("comparison");
-    pub const SLAB: &str = study!("slab");
-    pub const SLAB_RIVALS: &str = study!("slab-rivals");
-    pub const DIAL: &str = study!("dial");
-    pub const VARIANTS: &str = study!("variants");
-    pub const MASKS: &str = study!("masks");
-    pub const ROUNDS: &str = study!("rounds");
-    pub const TABLE_1: &str = study!("table-1", "table-1");
-    pub const VIEWS: &str = study!("views");
-    pub const EXPECTATIONS: &str = study!("expectations");
-    pub const EXPECTATIONS_CLOSELY: &str = study!("expectations-closely");
-    pub const FIGURE_8: &str = study!("figure-8", "figure-8");
+    pub(crate) const COMPARISON: &str = study!("comparison");
+    pub(crate) const SLAB: &str = study!("slab");
+    pub(crate) const SLAB_RIVALS: &str = study!("slab-rivals");
+    pub(crate) const DIAL: &str = study!("dial");
+    pub(crate) const VARIANTS: &str = study!("variants");
+    pub(crate) const MASKS: &str = study!("masks");
+    pub(crate) const ROUNDS: &str = study!("rounds");
+    pub(crate) const TABLE_1: &str = study!("table-1", "table-1");
+    pub(crate) const VIEWS: &str = study!("views");
+    pub(crate) const EXPECTATIONS: &str = study!("expectations");
+    pub(crate) const EXPECTATIONS_CLOSELY: &str = study!("expectations-closely");
+    pub(crate) const FIGURE_8: &str = study!("figure-8", "figure-8");
 }
 
 /// Reads an embedded study.
@@ -82,12 +82,12 @@ pub(in crate::study) struct Frames {
 
 impl Frames {
     /// Frames whose samples lie where an antialiased picture has them.
-    pub fn new(side: u32, captured: u32, seeds: u32) -> Self {
+    pub(crate) fn new(side: u32, captured: u32, seeds: u32) -> Self {
         Frames { side, captured, pattern: PatternKind::Auto, seeds }
     }
 
     /// The same with all samples at the pixel's centre: without antialiasing.
-    pub fn centred(self) -> Self {
+    pub(crate) fn centred(self) -> Self {
         Frames { pattern: PatternKind::Centre, ..self }
     }
 }
@@ -166,7 +166,7 @@ impl MeasuredScene {
 
 impl Found {
     /// The scenes that are there, called by `title`.
-    pub fn scenes(&self, title: impl Fn(&SceneEntry) -> String) -> Vec<MeasuredScene> {
+    pub(crate) fn scenes(&self, title: impl Fn(&SceneEntry) -> String) -> Vec<MeasuredScene> {
         let Results { study, scenes, records, .. } = &self.results;
         let both = study.scenes.iter().zip(scenes);
         both.map(|(entry, facts)| MeasuredScene {

@@ -61,7 +61,7 @@ pub(in crate::study) struct Values {
 
 impl Values {
     /// Those of every hash, with or without the seeds hashed first, and the hash's name.
-    pub fn all() -> impl Iterator<Item = (Self, &'static str)> {
+    pub(crate) fn all() -> impl Iterator<Item = (Self, &'static str)> {
         let named = Reference::ALL.iter().zip(Reference::CHOICES);
         let each = named.flat_map(|(reference, choice)| {
             let reference = *reference;
@@ -72,7 +72,7 @@ impl Values {
     }
 
     /// The reference value of sample number `n` of a pixel with so many samples.
-    pub fn at(self, n: u32, samples: u32, pixel: u32, surface: u32, seed: u32) -> u32 {
+    pub(crate) fn at(self, n: u32, samples: u32, pixel: u32, surface: u32, seed: u32) -> u32 {
         let key = ReferenceKey { pixel: PixelIndex(pixel), surface, seed };
         let key = if self.prehash { key.prehashed() } else { key };
         self.reference.value(n, samples, &key)

@@ -15,7 +15,7 @@ use screendoor_trace::tile::{TILE_PIXELS, TileGrid, TileMap};
 use screendoor_trace::trace::{Trace, TraceWriter, WriteOptions, statistics_within};
 
 /// What runs are told of.
-pub type Watch<'a> = &'a (dyn Fn(&str) + Sync);
+pub(super) type Watch<'a> = &'a (dyn Fn(&str) + Sync);
 
 /// A scene that is being measured.
 pub(super) struct OpenScene {
@@ -32,7 +32,7 @@ impl OpenScene {
     /// # Errors
     /// As [`scene::load`], [`Trace::open`] and [`screendoor_designs::Configured::replay`];
     /// [`Error::Invalid`] where the trace is not the one that was measured before.
-    pub fn open(store: &Store, index: usize, base: &Path, watch: Watch<'_>) -> Result<Self> {
+    pub(super) fn open(store: &Store, index: usize, base: &Path, watch: Watch<'_>) -> Result<Self> {
         let entry = &store.study().scenes[index];
         let own = store.folder().join(store.trace_name(index));
         let mut warnings = None;

@@ -23,18 +23,18 @@ pub(super) struct Ended {
 
 impl Ended {
     /// Whether it did what it was asked.
-    pub fn succeeded(&self) -> bool {
+    pub(super) fn succeeded(&self) -> bool {
         self.code == Some(0)
     }
 
     /// Whether it refused with one line that says why.
-    pub fn refused(&self) -> bool {
+    pub(super) fn refused(&self) -> bool {
         let errors = self.said.lines().filter(|l| l.starts_with("screendoor: error: ")).count();
         self.code == Some(1) && errors == 1 && !self.said.contains("panicked")
     }
 
     /// How it ended, in words.
-    pub fn words(&self) -> String {
+    pub(super) fn words(&self) -> String {
         let said = self.said.lines().last().unwrap_or("no word");
         match self.code {
             _ if self.hung => "it hangs".to_string(),

@@ -144,7 +144,7 @@ struct Channel {
 impl<'a> Judge<'a> {
     /// # Errors
     /// As [`Case::positions`].
-    pub fn new(case: &'a Case, tests: usize) -> Result<Self> {
+    pub(super) fn new(case: &'a Case, tests: usize) -> Result<Self> {
         let positions = case.positions()?;
         let kinds = 0..case.kinds.len();
         let truths = kinds.map(|kind| truth(case, &case.stored(kind), &positions)).collect();
@@ -152,7 +152,7 @@ impl<'a> Judge<'a> {
     }
 
     /// The verdict on one picture, or on those of several seeds.
-    pub fn outcome(&self, pictures: &[Picture]) -> Outcome {
+    pub(super) fn outcome(&self, pictures: &[Picture]) -> Outcome {
         let pixels = (0..self.truths.len()).flat_map(|kind| self.case.pixels(kind));
         let pixels: Vec<(u32, u32)> = pixels.collect();
         let finite = |p: &Picture, (x, y): (u32, u32)| p.get(x, y).iter().all(|c| c.is_finite());

@@ -6,7 +6,7 @@ use screendoor_trace::trace::Fragment;
 
 /// The truth about a pixel.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Truth {
+pub(super) struct Truth {
     /// Its linear colour.
     pub colour: [f64; 3],
     /// What its contributions come to without their signs, the largest channel: what

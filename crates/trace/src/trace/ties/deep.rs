@@ -43,7 +43,7 @@ impl<'a> DeepPixel<'a> {
     ///
     /// # Errors
     /// [`Error::Config`] where a bit for each fragment takes more than half of that.
-    pub fn new(
+    pub(super) fn new(
         site: (u32, u32),
         fragments: u64,
         positions: &'a [[i8; 2]],
@@ -79,7 +79,7 @@ impl<'a> DeepPixel<'a> {
     }
 
     /// How many times the trace is read.
-    pub fn passes(&self) -> u64 {
+    pub(super) fn passes(&self) -> u64 {
         (2 * self.positions.len() as u64 * self.parts).div_ceil(self.together)
     }
 
@@ -88,7 +88,7 @@ impl<'a> DeepPixel<'a> {
     ///
     /// # Errors
     /// As [`Trace::batch`].
-    pub fn tied(&self, trace: &Trace, read: &mut dyn FnMut(u64)) -> Result<u64> {
+    pub(super) fn tied(&self, trace: &Trace, read: &mut dyn FnMut(u64)) -> Result<u64> {
         let marks: Vec<AtomicU64> =
             (0..self.fragments.div_ceil(64)).map(|_| AtomicU64::new(0)).collect();
         // Drawn at random, so that nobody can make a trace whose depths are all in one part.

@@ -52,11 +52,11 @@ const KEYS: [&str; 5] =
     [key::PROJECTION, key::NEAR, key::FAR, key::WORLD_TO_VIEW, key::VIEW_TO_CLIP];
 
 mod key {
-    pub const PROJECTION: &str = "screendoor.view.projection";
-    pub const NEAR: &str = "screendoor.view.near";
-    pub const FAR: &str = "screendoor.view.far";
-    pub const WORLD_TO_VIEW: &str = "screendoor.view.world_to_view";
-    pub const VIEW_TO_CLIP: &str = "screendoor.view.view_to_clip";
+    pub(super) const PROJECTION: &str = "screendoor.view.projection";
+    pub(super) const NEAR: &str = "screendoor.view.near";
+    pub(super) const FAR: &str = "screendoor.view.far";
+    pub(super) const WORLD_TO_VIEW: &str = "screendoor.view.world_to_view";
+    pub(super) const VIEW_TO_CLIP: &str = "screendoor.view.view_to_clip";
 }
 
 /// How far lengths and right angles may be off: single precision turns no better after some

@@ -17,7 +17,7 @@ pub(super) struct Sheet {
 
 impl Sheet {
     /// The number of the point in column `i` of row `j`.
-    pub fn at(&self, i: usize, j: usize) -> usize {
+    pub(super) fn at(&self, i: usize, j: usize) -> usize {
         j * (self.cells + 1) + i
     }
 }
