@@ -120,7 +120,8 @@ fn summary(golden: &Golden) -> (u64, String) {
 }
 
 /// A line for each design and sample count, at seed 1: a hash over the hashes of the pictures
-/// of all traces. They are older than views, and those that ask for one are left out. Which of them has changed, `cargo run -p xtask -- same` tells.
+/// of all traces. They are older than views, and those that ask for one are left out. Which of
+/// them has changed, `cargo run -p xtask -- same` tells.
 fn pictures() -> String {
     let traces = TRACES.map(|golden| Trace::open(golden.path()).unwrap());
     let mut text = String::new();

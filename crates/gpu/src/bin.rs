@@ -156,47 +156,41 @@ impl Binner {
         let blocks = u64::from(chunk.params.rows).div_ceil(BLOCK).max(1);
         let usage = usage | wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
         let longest = gpu.buffer("the longest list", 8, usage)?;
+        // For any program of the file: all see the same buffers.
+        let bind = |params: &Params, [from, to]: [usize; 2], to_result: bool| {
+            let [other, own] = match to_result {
+                true => [&scratch.rows, &sorted.rows],
+                false => [&sorted.rows, &scratch.rows],
+            };
+            let buffers = [
+                ("params", &uniform(gpu, params)?),
+                ("columns", &chunk.columns),
+                ("slots", slots),
+                ("keys_from", &scratch.keys[from]),
+                ("rows_from", other),
+                ("keys_to", &scratch.keys[to]),
+                ("rows_to", own),
+                ("counts", &scratch.counts),
+                ("ends", &sorted.ends),
+            ];
+            gpu.bind(&self.bound, &buffers)
+        };
         gpu.submit("sorting a chunk", |encoder| {
             for digit in 0..digits {
                 let params =
                     Params { digit_at: digit * DIGIT_BITS, blocks: blocks as u32, ..chunk.params };
-                let (from, to) = ((digit as usize + 1) % 2, digit as usize % 2);
+                let keys = [(digit as usize + 1) % 2, digit as usize % 2];
                 // The last digit's rows are the result.
-                let places = |to_result| if to_result { &sorted.rows } else { &scratch.rows };
-                let to_result = (digits - 1 - digit).is_multiple_of(2);
-                let buffers = [
-                    ("params", &uniform(gpu, &params)?),
-                    ("columns", &chunk.columns),
-                    ("slots", slots),
-                    ("keys_from", &scratch.keys[from]),
-                    ("rows_from", places(!to_result)),
-                    ("keys_to", &scratch.keys[to]),
-                    ("rows_to", places(to_result)),
-                    ("counts", &scratch.counts),
-                    ("ends", &sorted.ends),
-                ];
+                let bound = bind(&params, keys, (digits - 1 - digit).is_multiple_of(2))?;
                 let [count, scatter] = if digit == 0 { &self.first } else { &self.next };
                 encoder.clear_buffer(&scratch.counts, 0, None);
-                let bound = gpu.bind(count, &buffers)?;
                 timer.run(gpu, encoder, "bin", (count, &bound), blocks);
                 self.sum(gpu, timer, encoder, scratch, counted(u64::from(chunk.params.rows)))?;
-                let bound = gpu.bind(scatter, &buffers)?;
                 timer.run(gpu, encoder, "bin", (scatter, &bound), blocks);
             }
             // The sorted keys are read from where the last digit left them.
             let last = (digits as usize - 1) % 2;
-            let buffers = [
-                ("params", &uniform(gpu, &chunk.params)?),
-                ("columns", &chunk.columns),
-                ("slots", slots),
-                ("keys_from", &scratch.keys[last]),
-                ("rows_from", &scratch.rows),
-                ("keys_to", &scratch.keys[1 - last]),
-                ("rows_to", &sorted.rows),
-                ("counts", &scratch.counts),
-                ("ends", &sorted.ends),
-            ];
-            let bound = gpu.bind(&self.bound, &buffers)?;
+            let bound = bind(&chunk.params, [last, 1 - last], true)?;
             let groups = u64::from(chunk.params.rows).div_ceil(256);
             timer.run(gpu, encoder, "bin", (&self.bound, &bound), groups);
             let params = length(gpu, u64::from(sorted.pixels))?;
