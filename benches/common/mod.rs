@@ -139,16 +139,13 @@ pub fn assert_same(a: &dyn TiledDesign, b: &dyn TiledDesign, frame: &Frame, tile
     }
 }
 
-/// The engines that this machine can run, but for the portable one, which is slower than the
-/// reference.
+/// The engines that this machine can run.
 pub fn engines() -> impl Iterator<Item = (&'static str, Implementation)> {
     let all = Implementation::CHOICES
         .iter()
         .zip(Implementation::ALL)
         .map(|(choice, implementation)| (choice.name, *implementation));
-    all.filter(|(_, implementation)| {
-        implementation.level().is_ok() && *implementation != Implementation::Portable
-    })
+    all.filter(|(_, implementation)| implementation.level().is_ok())
 }
 
 /// What is read when the machine's memory is measured: more than the caches hold.

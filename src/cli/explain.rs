@@ -135,6 +135,9 @@ fn print_step(
         }
     }
     line("writes", list(record.written))?;
+    for remark in &record.remarks {
+        line("", remark.clone())?;
+    }
     let after = &step.contents;
     if !after.samples.is_empty() {
         let shown: Vec<String> = after
@@ -154,7 +157,9 @@ fn print_step(
         }
     }
     for (name, value) in &after.fields {
-        line(name, value.clone())?;
+        for (i, part) in value.split("; ").enumerate() {
+            line(if i == 0 { name } else { "" }, part.to_string())?;
+        }
     }
     Ok(())
 }

@@ -158,6 +158,7 @@ impl Listen for Direct {
                 counts.state_bits_read += u64::from(read);
                 counts.state_bits_written += u64::from(written);
             }
+            Event::Remark(_) => {}
         }
     }
 }
@@ -192,6 +193,7 @@ const TOLD: &[(&str, Told)] = &[
     ("exact", told::<designs::Exact>),
     ("lk", told::<designs::LaineKarras>),
     ("systematic", told::<designs::Systematic>),
+    ("residual", told::<designs::Residual>),
     ("enderton", told::<designs::Enderton>),
     ("hashed-alpha", told::<designs::HashedAlpha>),
     ("alpha-to-coverage", told::<designs::AlphaToCoverage>),
@@ -199,6 +201,7 @@ const TOLD: &[(&str, Told)] = &[
     ("kbuffer", told::<designs::KBuffer>),
     ("abuffer", told::<designs::ABuffer>),
     ("mlab", told::<designs::Mlab>),
+    ("merging", told::<designs::Merging>),
     ("hybrid", told::<designs::Hybrid>),
     ("adaptive", told::<designs::Adaptive>),
     ("depth-peeling", told::<designs::DepthPeeling>),

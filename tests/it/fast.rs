@@ -141,6 +141,11 @@ fn systematic_is_its_plain_text() {
 }
 
 #[test]
+fn residual_is_its_plain_text() {
+    check_counts("residual");
+}
+
+#[test]
 fn enderton_is_its_plain_text() {
     check_counts("enderton");
 }
@@ -156,7 +161,7 @@ fn a_pixel_told_fragment_by_fragment_is_the_same() {
     let header = header(8, 8, 8);
     let fragments: Vec<Fragment> = crowd(&header, 80, 7).into_iter().filter(|f| f.x == 0).collect();
     let trace = trace(&header, &fragments);
-    for name in ["lk", "systematic", "enderton", "exact"] {
+    for name in ["lk", "systematic", "residual", "enderton", "exact"] {
         let design = crate::util::design(name);
         let explained = design.explain(&trace, 8, 5, Site { x: 0, y: 0 }, &|_, _| ()).unwrap();
         let picture = crate::util::picture(&design, &trace, 8, 5);

@@ -110,7 +110,9 @@ fn check_all(name: &str) {
 #[ignore = "takes ten minutes on a software driver: every variant at every count, both ways"]
 fn every_variant_at_every_count_is_its_plain_text() {
     let Some(gpu) = gpu() else { return };
-    for entry in DESIGNS.iter().filter(|e| ["lk", "systematic", "enderton"].contains(&e.info.name))
+    for entry in DESIGNS
+        .iter()
+        .filter(|e| ["lk", "systematic", "residual", "enderton"].contains(&e.info.name))
     {
         for (i, design) in variants(entry).into_iter().enumerate() {
             for samples in COUNTS {
@@ -129,6 +131,11 @@ fn lk_is_its_plain_text() {
 #[test]
 fn systematic_is_its_plain_text() {
     check_all("systematic");
+}
+
+#[test]
+fn residual_is_its_plain_text() {
+    check_all("residual");
 }
 
 #[test]
@@ -217,6 +224,11 @@ fn mlab_is_near_its_plain_text() {
 }
 
 #[test]
+fn merging_is_near_its_plain_text() {
+    check_blended("merging");
+}
+
+#[test]
 fn wboit_is_near_its_plain_text() {
     check_blended("wboit");
 }
@@ -227,8 +239,14 @@ fn slab_is_near_its_plain_text() {
 }
 
 /// The stochastic designs, and one that sums over passes.
-const STOCHASTIC: [&str; 5] =
-    ["lk", "systematic", "enderton", "enderton:mask=naive", "lk:method=depth-correction"];
+const STOCHASTIC: [&str; 6] = [
+    "lk",
+    "systematic",
+    "residual",
+    "enderton",
+    "enderton:mask=naive",
+    "lk:method=depth-correction",
+];
 
 #[test]
 fn captured_scenes_give_the_same_bits_in_chunks_of_any_size() {

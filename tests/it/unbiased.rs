@@ -11,7 +11,7 @@
 use rayon::prelude::*;
 use screendoor::design::{Configured, Entry};
 use screendoor::error::Result;
-use screendoor::metrics::{Ensemble, Region, errors, student_t};
+use screendoor::metrics::{Ensemble, ROUNDING, Region, errors, student_t};
 use screendoor::param::Values;
 use screendoor::picture::Picture;
 use screendoor::random::{Stream, hash};
@@ -46,9 +46,9 @@ fn cases(samples: u32) -> Vec<Case> {
     let near_first = layered(&header, 6, |i| {
         (20 * (i + 1), colour(i), [0.3, 0.5, 0.2, 0.7, 0.4, 0.6][i as usize])
     });
-    // More layers than anyone keeps, of an alpha that 10 bits round down.
+    // More layers than anyone keeps or merges well, of an alpha that 10 bits round down.
     let small = util::header(12, 12, samples);
-    let deep = layered(&small, 40, |i| (i * 7 % 40, colour(i), 30.45 / 1023.0));
+    let deep = layered(&small, 100, |i| (i * 37 % 100, colour(i), 30.45 / 1023.0));
     cases.push(("deep", small.clone(), deep));
     let mut far_first = near_first.clone();
     far_first.reverse();
@@ -192,7 +192,7 @@ fn deviations_from(
     if !seeded {
         // Nothing random: an error is a bias, but for the rounding of sums.
         let worst = match errors(&of_seed(0), expected, &region).max {
-            rounding if rounding < 1e-3 => 0.0,
+            rounding if rounding < ROUNDING => 0.0,
             _ => f64::INFINITY,
         };
         return (worst, worst, 1);
@@ -200,7 +200,7 @@ fn deviations_from(
     // Seeds that are far apart in no particular way.
     (0..SEEDS).for_each(|i| ensemble.add(&of_seed(hash([i]))));
     let e = &ensemble.finish()[0];
-    let t = if e.mean.value.abs() < 1e-9 { 0.0 } else { e.mean.standard_errors(SEEDS as usize) };
+    let t = e.mean.standard_errors(SEEDS as usize);
     let scores = ensemble.z_scores(0);
     let z = scores.iter().fold(0.0_f64, |worst, z| worst.max(z.abs()));
     (t, z, scores.len())

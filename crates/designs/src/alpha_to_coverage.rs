@@ -4,12 +4,12 @@
 
 use screendoor_rop::stochastic::{self, Round, Sampler, Stochastic};
 use screendoor_rop::{
-    Blueprint, Family, Frame, Info, OpaquePromise, OrderPromise, Probe, Promises, Site, Threshold,
-    colour, depth_bits,
+    Blueprint, Family, Frame, Info, OpaquePromise, OrderPromise, Probe, Promises, Samples, Site,
+    Threshold, colour, depth_bits,
 };
 use screendoor_trace::error::Result;
 use screendoor_trace::param::Values;
-use screendoor_trace::trace::{Fragment, SampleMask, Unorm32};
+use screendoor_trace::trace::{Fragment, SampleMask};
 
 /// The design's entry in the registry.
 pub struct AlphaToCoverage;
@@ -62,7 +62,7 @@ impl<const N: usize> Sampler<N> for FixedMask {
         _round: Round,
         _site: Site,
         (): &mut (),
-        _stored: &[Unorm32; N],
+        _samples: &Samples<N>,
         passed: SampleMask,
         fragment: &Fragment,
         _probe: &mut P,

@@ -9,13 +9,13 @@
 
 use screendoor_rop::stochastic::{self, Round, Sampler, Stochastic};
 use screendoor_rop::{
-    Blueprint, Family, Frame, Info, OpaquePromise, OrderPromise, Probe, Promises, Site, Threshold,
-    colour, depth_bits,
+    Blueprint, Family, Frame, Info, OpaquePromise, OrderPromise, Probe, Promises, Samples, Site,
+    Threshold, colour, depth_bits,
 };
 use screendoor_trace::error::Result;
 use screendoor_trace::param::{Typed, Values};
 use screendoor_trace::random::hash;
-use screendoor_trace::trace::{Fragment, SampleMask, Unorm32};
+use screendoor_trace::trace::{Fragment, SampleMask};
 
 screendoor_trace::options! {
     /// For what a threshold is computed.
@@ -135,7 +135,7 @@ impl<const N: usize> Sampler<N> for HashedThreshold {
         round: Round,
         site: Site,
         (): &mut (),
-        _stored: &[Unorm32; N],
+        _samples: &Samples<N>,
         passed: SampleMask,
         fragment: &Fragment,
         probe: &mut P,

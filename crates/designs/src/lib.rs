@@ -21,7 +21,9 @@ mod hybrid;
 mod kbuffer;
 mod lk;
 mod mboit;
+mod merging;
 mod mlab;
+mod residual;
 mod slab;
 mod sorted_blend;
 mod systematic;
@@ -39,7 +41,9 @@ pub use hybrid::Hybrid;
 pub use kbuffer::KBuffer;
 pub use lk::LaineKarras;
 pub use mboit::MomentBased;
+pub use merging::Merging;
 pub use mlab::Mlab;
+pub use residual::Residual;
 pub use slab::Slab;
 pub use sorted_blend::SortedBlend;
 pub use systematic::Systematic;
@@ -57,6 +61,7 @@ pub static DESIGNS: &[Entry] = &[
     Entry::of::<Exact>(),
     Entry::of::<LaineKarras>(),
     Entry::of::<Systematic>(),
+    Entry::of::<Residual>(),
     Entry::of::<Enderton>(),
     Entry::of::<HashedAlpha>(),
     Entry::of::<AlphaToCoverage>(),
@@ -64,6 +69,7 @@ pub static DESIGNS: &[Entry] = &[
     Entry::of::<KBuffer>(),
     Entry::of::<ABuffer>(),
     Entry::of::<Mlab>(),
+    Entry::of::<Merging>(),
     Entry::of::<Hybrid>(),
     Entry::of::<Adaptive>(),
     Entry::of::<DepthPeeling>(),

@@ -66,6 +66,8 @@ pub trait Lanes<S: Simd>: Copy {
     fn mask(simd: S, bits: u64) -> Self::Mask;
     /// One bit a lane.
     fn bits(mask: Self::Mask) -> u64;
+    /// All lanes together, modulo 2^32.
+    fn sum(self) -> i32;
 }
 
 /// `K` vectors side by side.
@@ -235,6 +237,15 @@ where
         }
         bits
     }
+    #[inline(always)]
+    fn sum(self) -> i32 {
+        let [first, others @ ..] = &self.0[..] else { return 0 };
+        let mut sum = *first;
+        for vector in others {
+            sum = sum + *vector;
+        }
+        sum.reduce_sum()
+    }
 }
 
 macro_rules! width {
@@ -262,8 +273,9 @@ width! {
 }
 
 /// Instruction sets for which kernels are compiled and that this machine has, with
-/// their names, the fastest first. The last one is plain Rust and is there everywhere.
-/// (x86 processors with SSE2 alone are old by now, and each set costs compile time.)
+/// their names, the fastest first. Without any of them the plain text is faster than a
+/// kernel would be. (x86 processors with SSE2 alone are old by now, and each set costs compile
+/// time.)
 pub fn levels() -> Vec<(&'static str, Level)> {
     let here = Level::new();
     let mut levels = Vec::new();
@@ -274,12 +286,11 @@ pub fn levels() -> Vec<(&'static str, Level)> {
     }
     #[cfg(target_arch = "aarch64")]
     levels.extend(here.as_neon().map(|token| ("neon", Level::Neon(token))));
-    levels.push(("portable", Level::fallback()));
     levels
 }
 
-/// The body of a function: `$body` with `$simd` as the token of `$level`, compiled for
-/// AVX-512, AVX2 or NEON, and for any machine.
+/// The body of a function: `$body` with `$simd` as the token of `$level`, one of [`levels`],
+/// compiled for AVX-512, AVX2 or NEON.
 #[macro_export]
 #[doc(hidden)]
 macro_rules! for_level {
@@ -310,11 +321,6 @@ macro_rules! for_level {
                 || $body,
             );
         }
-        let $simd = fearless_simd::Fallback::new();
-        fearless_simd::Simd::vectorize(
-            $simd,
-            #[inline(always)]
-            || $body,
-        )
+        unreachable!("no kernel is compiled for {level:?}")
     }};
 }

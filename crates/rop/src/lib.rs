@@ -26,7 +26,8 @@ pub use contract::colour::ColourStore;
 pub use contract::contents::{Contents, SampleContents};
 pub use contract::design::Design;
 pub use contract::event::{
-    Event, EventCounts, Listen, NoProbe, Probe, Record, ReferenceRecord, network_comparators,
+    Event, EventCounts, Listen, NoProbe, Probe, Record, ReferenceRecord, Remark,
+    network_comparators,
 };
 pub use contract::frame::{Frame, Site};
 pub use contract::info::{Family, Info};

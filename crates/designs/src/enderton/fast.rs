@@ -6,7 +6,7 @@ use crate::enderton::{Among, EndertonSampler, MaskRule, Words};
 use screendoor_rop::fast::{
     FastSampler, Lanes, Loaded, Offered, Tally, below, picked, ranks_of_distinct,
 };
-use screendoor_rop::{Probe, Round};
+use screendoor_rop::{Probe, Round, Samples};
 use screendoor_trace::random::{GOLDEN, MIX, hash};
 use screendoor_trace::tile::{TILE_PIXELS, TileGrid, TileId};
 use screendoor_trace::trace::MAX_SAMPLES;
@@ -41,7 +41,7 @@ impl<const N: usize> FastSampler<N> for FastEnderton<N> {
     }
 
     fn to_plain(&self, (): ()) {}
-    fn of_plain(&self, (): &(), (): &mut ()) {}
+    fn of_plain(&self, (): &(), _: &Samples<N>, (): &mut ()) {}
     fn enter(&self, _: &Round, _: &mut [(); TILE_PIXELS]) {}
 
     #[inline(always)]

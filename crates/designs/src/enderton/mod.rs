@@ -12,14 +12,14 @@ use screendoor_rop::stochastic::{self, COMBINATIONS, METHOD, OPAQUE, ROUNDS, STR
 use screendoor_rop::{
     Blueprint, Declaration, Dither, Family, Frame, Info, OnDevice, OpaquePromise, OrderPromise,
     PixelOrder, PixelWords, Port, Probe, Promise, Promises, Reference, ReferenceKey, Round,
-    Sampler, Site, Stochastic, Threshold, TiledDesign, colour, depth_bits, random_subset,
+    Sampler, Samples, Site, Stochastic, Threshold, TiledDesign, colour, depth_bits, random_subset,
     stratified,
 };
 use screendoor_trace::error::Result;
 use screendoor_trace::param::{Typed, Values};
 use screendoor_trace::random::hash;
 use screendoor_trace::tile::TileGrid;
-use screendoor_trace::trace::{Fragment, MAX_SAMPLES, SampleMask, Unorm32};
+use screendoor_trace::trace::{Fragment, MAX_SAMPLES, SampleMask};
 
 screendoor_trace::options! {
     /// How a fragment's samples are chosen.
@@ -283,7 +283,7 @@ impl<const N: usize> Sampler<N> for EndertonSampler<N> {
         round: Round,
         site: Site,
         (): &mut (),
-        _stored: &[Unorm32; N],
+        _samples: &Samples<N>,
         passed: SampleMask,
         fragment: &Fragment,
         probe: &mut P,

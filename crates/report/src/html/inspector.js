@@ -79,6 +79,11 @@ function referenceLine({ fragment, record }) {
   return line;
 }
 
+/** What the design says of the fragment beside that. */
+function remarks({ record }) {
+  return (record.remarks ?? []).map((line) => make('p', { class: 'counts' }, line));
+}
+
 /** The reference values in words, folded away, in the order in which they were drawn. */
 function referenceWords({ record }) {
   const count = record.references.length;
@@ -161,7 +166,7 @@ function stepRow(step, number, { samples, severalPasses }, before) {
     make('div', { class: 'tests' }, fate(step, samples)),
     make('div', { class: 'opacity' },
       record.surface === null ? null : make('p', { class: 'surface' }, `starts surface ${record.surface}`),
-      sortedOrder(record), referenceLine(step), referenceWords(step)),
+      sortedOrder(record), referenceLine(step), referenceWords(step), ...remarks(step)),
     make('div', { class: 'after' }, contents(step.contents, before, samples)));
 }
 

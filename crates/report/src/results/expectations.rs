@@ -68,8 +68,7 @@ pub(super) fn section(p: &Publications) -> Option<Section> {
 
 /// How far a mean error lies from 0, in standard errors.
 fn deviation(m: &MeanError) -> f64 {
-    let (mean, seeds) = (m.run.covered.mean, m.run.seeds as usize);
-    if mean.value == 0.0 { 0.0 } else { mean.standard_errors(seeds) }
+    m.run.covered.mean.standard_errors(m.run.seeds as usize)
 }
 
 /// Where mean errors are within what chance allows.

@@ -1,5 +1,7 @@
 //! What a raster-operations unit does, as countable events.
 
+use std::fmt;
+
 use serde::{Deserialize, Serialize};
 
 use crate::contract::opacity::Threshold;
@@ -46,6 +48,19 @@ pub enum Event<'a> {
         /// Bits written.
         written: u32,
     },
+    /// What a design has to say about the fragment beside all that, for whoever reads it: one
+    /// line, which is made only where it is asked for.
+    Remark(Remark<'a>),
+}
+
+/// A line of words that is not made yet.
+#[derive(Clone, Copy)]
+pub struct Remark<'a>(pub &'a dyn Fn() -> String);
+
+impl fmt::Debug for Remark<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&(self.0)())
+    }
 }
 
 /// Who is told what a design does while it draws. With [`NoProbe`] all of it vanishes
@@ -64,7 +79,7 @@ pub enum Event<'a> {
 ///             Event::Hashed(count) => self.0 += count,
 ///             Event::Fragment(_) | Event::DepthTest { .. } | Event::Surface(_) => {}
 ///             Event::Sorted(_) | Event::Reference { .. } | Event::Written(_) => {}
-///             Event::Compared(_) | Event::State { .. } => {}
+///             Event::Compared(_) | Event::State { .. } | Event::Remark(_) => {}
 ///         }
 ///     }
 /// }
@@ -89,7 +104,7 @@ pub enum Event<'a> {
 ///             Event::Fragment(_) | Event::DepthTest { .. } | Event::Surface(_) => {}
 ///             Event::Sorted(_) | Event::Reference { .. } | Event::Written(_) => {}
 ///             // Nothing about `Event::Compared`.
-///             Event::State { .. } => {}
+///             Event::State { .. } | Event::Remark(_) => {}
 ///         }
 ///     }
 /// }
@@ -172,6 +187,13 @@ pub trait Probe: Listen {
     #[inline(always)]
     fn state(&mut self, read: u32, written: u32) {
         self.event(Event::State { read, written });
+    }
+    /// [`Event::Remark`].
+    #[inline(always)]
+    fn remark(&mut self, line: impl Fn() -> String) {
+        if Self::LISTENS {
+            self.event(Event::Remark(Remark(&line)));
+        }
     }
 }
 
@@ -353,6 +375,7 @@ impl Listen for EventCounts {
                 self.state_bits_read += u64::from(read);
                 self.state_bits_written += u64::from(written);
             }
+            Event::Remark(_) => {}
         }
     }
 }
@@ -390,6 +413,8 @@ pub struct Record {
     pub state_bits_read: u32,
     /// Bits of pixel state written.
     pub state_bits_written: u32,
+    /// What else the design says of it, line by line.
+    pub remarks: Vec<String>,
 }
 
 /// One opacity test.
@@ -443,6 +468,7 @@ impl Listen for Record {
                 self.state_bits_read += read;
                 self.state_bits_written += written;
             }
+            Event::Remark(Remark(line)) => self.remarks.push(line()),
         }
     }
 }

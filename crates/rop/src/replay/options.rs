@@ -13,7 +13,6 @@ screendoor_trace::options! {
         Avx512 = "avx512": "the same with AVX-512 (x86)",
         Avx2 = "avx2": "the same with AVX2 (x86)",
         Neon = "neon": "the same with NEON (ARM)",
-        Portable = "portable": "the same without vector instructions of its own",
         Reference = "reference": "the plain text that says what the design is",
     }
 }
@@ -27,8 +26,7 @@ impl Implementation {
         let name = match self {
             // Without vector instructions the plain text is the faster one.
             Implementation::Fast => {
-                let best = levels().into_iter().find(|(_, level)| !level.is_fallback());
-                return Ok(best.map(|(_, level)| level));
+                return Ok(levels().first().map(|(_, level)| *level));
             }
             Implementation::Reference => return Ok(None),
             _ => Self::CHOICES[self as usize].name,

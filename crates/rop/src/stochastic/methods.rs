@@ -111,8 +111,13 @@ pub trait Sampler<const N: usize>: Send + Sync {
     /// Bits of that state.
     fn state_bits(&self) -> u32;
 
+    /// What they hold.
+    fn layout(&self) -> Layout {
+        Layout::of(1, &[(self.state_bits(), "tracking")])
+    }
+
     /// The samples of `passed` that the fragment writes, where `passed` are those of
-    /// its samples that are not behind the `stored` depths. Tells `probe` of its
+    /// its samples that are not behind what `samples` hold. Tells `probe` of its
     /// state's bits, surfaces, sorts, hashes and reference values.
     #[expect(clippy::too_many_arguments, reason = "everything that a choice may depend on")]
     fn choose<P: Probe>(
@@ -120,11 +125,20 @@ pub trait Sampler<const N: usize>: Send + Sync {
         round: Round,
         site: Site,
         state: &mut Self::State,
-        stored: &[Unorm32; N],
+        samples: &Samples<N>,
         passed: SampleMask,
         fragment: &Fragment,
         probe: &mut P,
     ) -> SampleMask;
+
+    /// Whether it knows of an [`Sampler::excess`].
+    const CORRECTS: bool = false;
+
+    /// By how much the samples' mean is estimated to exceed its expectation: in a single
+    /// pass it is taken away when the pixel is resolved.
+    fn excess(&self, _state: &Self::State) -> [f64; 3] {
+        [0.0; 3]
+    }
 
     /// Names and values of the state, for `explain`.
     fn fields(&self, _state: &Self::State) -> Vec<(&'static str, String)> {
@@ -349,8 +363,7 @@ impl<S: Sampler<N>, const N: usize> Methods<S, N> {
         probe.depth_test(fragment.coverage, passed);
         probe.state(self.depth_bits * fragment.coverage.count(), 0);
         let round = self.round(round);
-        let written =
-            self.sampler.choose(round, site, state, &samples.depth, passed, fragment, probe);
+        let written = self.sampler.choose(round, site, state, samples, passed, fragment, probe);
         let colour = self.colour.colour(fragment.colour);
         for s in written.iter() {
             samples.write(s, z[s], colour);
@@ -360,6 +373,17 @@ impl<S: Sampler<N>, const N: usize> Methods<S, N> {
         }
         probe.written(written);
         probe.state(0, self.sample_bits() * written.count());
+    }
+
+    /// What the samples show on average, as far as the sampler knows.
+    #[inline]
+    pub(crate) fn mean(&self, colours: &[[f32; 3]; N], excess: impl Fn() -> [f64; 3]) -> [f64; 3] {
+        let mean = box_filter(colours);
+        if !S::CORRECTS {
+            return mean;
+        }
+        let excess = excess();
+        std::array::from_fn(|i| mean[i] - excess[i])
     }
 
     /// E equation 5: the product of what the fragments let through.
@@ -416,7 +440,7 @@ impl<S: Sampler<N>, const N: usize> Transparent<N> for Methods<S, N> {
         let occupied = u32::from(self.method == Method::AlphaCorrection);
         let sums = u32::from(self.method.depth_based() || self.rounds > 1);
         Layout::samples(samples, &self.sample())
-            .and(1, &[(self.sampler.state_bits(), "tracking")])
+            .joined(self.sampler.layout())
             .and(samples, &[(transmittance, "transmittance"), (occupied, "occupied")])
             .and(sums, &[(self.colour.colour_bits(), "summed colour"), (channel, "weight")])
     }
@@ -496,7 +520,7 @@ impl<S: Sampler<N>, const N: usize> Transparent<N> for Methods<S, N> {
 
     fn resolve(&self, _site: Site, pixel: &Self::Pixel, behind: &[[f32; 3]; N]) -> [f64; 3] {
         let Some(sums) = &pixel.sums else {
-            return box_filter(&pixel.samples.colour);
+            return self.mean(&pixel.samples.colour, || self.sampler.excess(&pixel.state));
         };
         if self.method == Method::Basic && sums.weight == 0.0 {
             // Nothing was written in any round: the sum of so many backgrounds is rounded.

@@ -73,7 +73,7 @@ impl Reference {
     }
 
     /// Loop iterations that a value takes.
-    pub(crate) fn iterations(self) -> u32 {
+    pub fn iterations(self) -> u32 {
         match self {
             Reference::Owen | Reference::Sobol => u32::BITS,
             _ => 0,

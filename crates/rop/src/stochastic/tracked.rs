@@ -7,7 +7,7 @@
 use crate::contract::event::Probe;
 use crate::contract::frame::{Frame, Site};
 use crate::contract::opacity::Threshold;
-use crate::contract::samples::{SampleList, in_sample_order, sort_by_stored_depth};
+use crate::contract::samples::{SampleList, Samples, in_sample_order, sort_by_stored_depth};
 use crate::contract::words::{Declaration, OnDevice, PixelWords};
 use crate::stochastic::methods::{Round, Sampler};
 use crate::stochastic::pixel_order::{PixelIndex, PixelOrder};
@@ -15,7 +15,7 @@ use crate::stochastic::reference_value::{Reference, ReferenceKey};
 use crate::stochastic::surface::{CoveredMask, SurfaceRule, SurfaceTracker, Tracked};
 use screendoor_trace::param::{Typed, Values};
 use screendoor_trace::tile::TileGrid;
-use screendoor_trace::trace::{Fragment, SampleMask, Unorm32};
+use screendoor_trace::trace::{Fragment, SampleMask};
 
 /// Where a surface's reference values come from.
 pub trait References: Send + Sync {
@@ -174,7 +174,7 @@ impl<R: References, const N: usize> Sampler<N> for TrackedSampler<R, N> {
         round: Round,
         site: Site,
         p: &mut Self::State,
-        stored: &[Unorm32; N],
+        samples: &Samples<N>,
         passed: SampleMask,
         fragment: &Fragment,
         probe: &mut P,
@@ -202,7 +202,7 @@ impl<R: References, const N: usize> Sampler<N> for TrackedSampler<R, N> {
         // 9: in the order of the depths that are stored, not of the fragment's own.
         let mut order: SampleList<N> = in_sample_order(s);
         if self.sort {
-            sort_by_stored_depth(&mut order, stored);
+            sort_by_stored_depth(&mut order, &samples.depth);
             probe.sorted(&order);
         }
 

@@ -4,9 +4,16 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::metrics::temporal::Deviations;
-use crate::metrics::{Errors, Estimate, Region, Temporal, UNIT, errors};
+use crate::metrics::{Errors, Estimate, ROUNDING, Region, Temporal, UNIT, errors};
 use screendoor_trace::picture::{Picture, TilePixels};
 use screendoor_trace::tile::{TILE_PIXELS, TileMap};
+
+/// Runs whose deviation is less than this agree, as a share of the range from black to white.
+const AGREEMENT: f64 = 1e-3;
+
+/// Something as probable as this, divided by how many runs there are, is missed by all of them
+/// once in 10^9 times: e^-RARE.
+const RARE: f64 = 20.7;
 
 /// Gathers the pictures of independent seeds against one reference, over one or
 /// more regions of the frame.
@@ -143,17 +150,22 @@ impl<'a> Ensemble<'a> {
 
     /// For every channel of every pixel of the region at place `region` (of those that
     /// no run touched, one for all):
-    /// the mean error over the runs, in units of its standard error. 0 where all
-    /// runs agree with the reference, infinite where they agree with each other
+    /// the mean error over the runs less [`ROUNDING`], in units of its standard error, and less what so many
+    /// runs may have missed where they agree. 0 where
+    /// all runs agree with the reference, infinite where they agree with each other
     /// and not with it.
     pub fn z_scores(&self, region: usize) -> Vec<f64> {
         let n = self.runs[region].len() as f64;
         let mut scores = Vec::new();
         self.for_each_pixel(self.regions[region], |means, variances, _| {
             for (mean, variance) in means.into_iter().zip(variances) {
-                // Rounding leaves crumbs where all runs are equal.
-                let exact = mean.abs() < 1e-6 && variance < 1e-12;
-                scores.push(if exact { 0.0 } else { mean / (variance / n).sqrt() });
+                // Rounding is no chance: where there is nearly none of that, it would count as
+                // a bias. So would what is too rare to have happened in so many runs, where
+                // they agree because of that.
+                let agree = variance < AGREEMENT * AGREEMENT;
+                let unseen = if agree { RARE / n } else { 0.0 };
+                let beyond = (mean.abs() - ROUNDING * UNIT - unseen).max(0.0).copysign(mean);
+                scores.push(if beyond == 0.0 { 0.0 } else { beyond / (variance / n).sqrt() });
             }
         });
         scores

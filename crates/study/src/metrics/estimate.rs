@@ -1,5 +1,6 @@
 //! Means with their uncertainty.
 
+use crate::metrics::ROUNDING;
 use serde::{Deserialize, Deserializer, Serialize};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -78,9 +79,11 @@ impl Estimate {
         }
     }
 
-    /// How far an [`Estimate::of`] so many runs lies from 0, in standard errors.
+    /// How far an [`Estimate::of`] so many runs, an error in 8-bit units, lies from 0 beyond
+    /// [`ROUNDING`], in standard errors.
     pub fn standard_errors(&self, runs: usize) -> f64 {
-        self.value.abs() * student_t(0.95, runs) / self.half_width()
+        let beyond = (self.value.abs() - ROUNDING).max(0.0);
+        if beyond == 0.0 { 0.0 } else { beyond * student_t(0.95, runs) / self.half_width() }
     }
 
     /// Half of the interval's width.
@@ -100,7 +103,10 @@ mod tests {
         assert_eq!(e.value, 3.0);
         assert!((e.half_width() - 2.776_445 * 0.5_f64.sqrt()).abs() < 1e-5, "{e:?}");
         // 3 is 3 / √½ of its standard errors.
-        assert!((e.standard_errors(5) - 3.0 * 2_f64.sqrt()).abs() < 1e-9);
+        assert!((e.standard_errors(5) - (3.0 - ROUNDING) * 2_f64.sqrt()).abs() < 1e-9);
+        // What runs agree on is no chance: either rounding or a bias.
+        let same = |value| Estimate::of(&[value; 5]).standard_errors(5);
+        assert_eq!([0.0, ROUNDING / 2.0, 2.0 * ROUNDING].map(same), [0.0, 0.0, f64::INFINITY]);
         assert_eq!(Estimate::of(&[7.0]), Estimate { value: 7.0, low: 7.0, high: 7.0 });
     }
 

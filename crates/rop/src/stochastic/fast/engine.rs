@@ -8,12 +8,11 @@ use crate::contract::layout::Layout;
 use crate::contract::over_opaque::Transparent;
 use crate::contract::tiled::{Listener, TileState, TiledDesign, sites};
 use crate::lanes::{Count, Width};
-use crate::resolve::box_filter;
 use crate::stochastic::fast::kernel;
 use crate::stochastic::fast::sampler::FastSampler;
 use crate::stochastic::fast::state::{FastTile, boxed};
 use crate::stochastic::fast::twin::FastEngine;
-use crate::stochastic::methods::{Pass, Round};
+use crate::stochastic::methods::{Pass, Round, Sampler};
 use screendoor_trace::picture::TilePixels;
 use screendoor_trace::tile::{TILE_PIXELS, TileGrid, TileId};
 use screendoor_trace::trace::{Block, Fragment};
@@ -157,7 +156,9 @@ where
                 let colours: [[f32; 3]; N] = std::array::from_fn(|s| {
                     std::array::from_fn(|c| f32::from_bits(colour[c].as_ref()[s] as u32))
                 });
-                box_filter(&colours)
+                let state = || self.sampler.to_plain(state.states[within]);
+                let plain = &self.plain.inner;
+                plain.mean(&colours, || plain.sampler.excess(&state()))
             } else {
                 let pixel = state.plain(&self.sampler, within);
                 Design::resolve(&self.plain, site, &pixel)

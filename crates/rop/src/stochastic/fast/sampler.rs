@@ -2,11 +2,12 @@
 
 use crate::contract::event::Probe;
 use crate::contract::frame::Site;
+use crate::contract::samples::Samples;
 use crate::lanes::Lanes;
 use crate::stochastic::methods::{Round, Sampler};
 use fearless_simd::Simd;
 use screendoor_trace::tile::{TILE_PIXELS, TileGrid, TileId};
-use screendoor_trace::trace::{Block, Fragment};
+use screendoor_trace::trace::{Block, DepthPlane, Fragment, Unorm32};
 
 use crate::stochastic::fast::limit::Limit;
 use crate::stochastic::fast::tally::Tally;
@@ -35,6 +36,20 @@ impl Row<'_> {
     #[inline(always)]
     pub fn object(&self) -> u32 {
         self.block.object[self.i]
+    }
+
+    /// Its colour.
+    #[inline(always)]
+    pub fn colour(&self) -> [f32; 3] {
+        let Row { block, i } = *self;
+        [block.r[i], block.g[i], block.b[i]]
+    }
+
+    /// Its depth over the pixel.
+    #[inline(always)]
+    pub fn depth(&self) -> DepthPlane {
+        let Row { block, i } = *self;
+        DepthPlane { z: Unorm32(block.z[i]), dzdx: block.dzdx[i], dzdy: block.dzdy[i] }
     }
 
     /// All of it; its coverage may hold samples behind opaque ones.
@@ -74,8 +89,13 @@ pub trait FastSampler<const N: usize>: Send + Sync + 'static {
     fn clear(&self, grid: TileGrid, tile: TileId) -> Vec<Self::State>;
     /// A state as the plain text has it.
     fn to_plain(&self, state: Self::State) -> <Self::Plain as Sampler<N>>::State;
-    /// The other way; `state` is what the pixel's was.
-    fn of_plain(&self, plain: &<Self::Plain as Sampler<N>>::State, state: &mut Self::State);
+    /// The other way, of a pixel whose samples are these; `state` is what it was.
+    fn of_plain(
+        &self,
+        plain: &<Self::Plain as Sampler<N>>::State,
+        samples: &Samples<N>,
+        state: &mut Self::State,
+    );
     /// Starts a round: works out what a pixel's fragments have in common in it.
     fn enter(&self, round: &Round, states: &mut [Self::State; TILE_PIXELS]);
     /// Bits of a stored depth.

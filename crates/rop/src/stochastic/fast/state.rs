@@ -106,7 +106,7 @@ where
                 row.as_mut()[s] = channel.to_bits() as i32;
             }
         }
-        sampler.of_plain(&state, &mut self.states[within]);
+        sampler.of_plain(&state, &samples, &mut self.states[within]);
         if let Some(slot) = self.sums.get_mut(within) {
             *slot = sums;
         }

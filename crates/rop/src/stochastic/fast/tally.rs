@@ -18,6 +18,8 @@ pub struct Tally<'a, P> {
     pub(super) written: u64,
     pub(super) tracked: u64,
     surfaces: u64,
+    compared: u64,
+    colours_read: u64,
     hashes: u64,
     /// Apart from the others: written where a number says, it must lie in memory.
     lengths: &'a mut Lengths,
@@ -34,6 +36,8 @@ impl<'a, P: Probe> Tally<'a, P> {
             written: 0,
             tracked: 0,
             surfaces: 0,
+            compared: 0,
+            colours_read: 0,
             hashes: 0,
             lengths,
             probe: PhantomData,
@@ -53,6 +57,22 @@ impl<'a, P: Probe> Tally<'a, P> {
     pub fn tracked(&mut self, touched: bool) {
         if P::LISTENS {
             self.tracked += u64::from(touched);
+        }
+    }
+
+    /// So many comparisons of what is kept beside the samples.
+    #[inline(always)]
+    pub fn compared(&mut self, count: u32) {
+        if P::LISTENS {
+            self.compared += u64::from(count);
+        }
+    }
+
+    /// So many samples' colours were read.
+    #[inline(always)]
+    pub fn colours_read(&mut self, count: u32) {
+        if P::LISTENS {
+            self.colours_read += u64::from(count);
         }
     }
 
@@ -87,8 +107,10 @@ impl<'a, P: Probe> Tally<'a, P> {
             hashes: self.hashes,
             sorts_by_length,
             surfaces: self.surfaces,
-            layers_compared: 0,
-            state_bits_read: bits(self.tested, depth_bits) + bits(self.tracked, state_bits),
+            layers_compared: self.compared,
+            state_bits_read: bits(self.tested, depth_bits)
+                + bits(self.colours_read, sample_bits - depth_bits)
+                + bits(self.tracked, state_bits),
             state_bits_written: bits(self.tracked, state_bits) + bits(self.written, sample_bits),
         }
     }

@@ -3,6 +3,7 @@
 use fearless_simd::Simd;
 
 use crate::contract::event::Probe;
+use crate::contract::samples::Samples;
 use crate::lanes::Lanes;
 use crate::stochastic::depth_bits;
 use crate::stochastic::fast::rank::{in_sample_order, picked, ranks, ranks_of_any};
@@ -194,6 +195,7 @@ impl<R: Rules, F: FastReferences<N>, const N: usize> FastSampler<N> for FastTrac
     fn of_plain(
         &self,
         plain: &TrackedState<<F::Plain as References>::Kept>,
+        _: &Samples<N>,
         state: &mut Self::State,
     ) {
         let SurfaceTracker { surface_id, numbered, last, .. } = plain.surface;

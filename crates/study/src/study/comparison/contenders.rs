@@ -69,14 +69,20 @@ mod tests {
     use screendoor_trace::param::Kind;
 
     /// Parameters whose every value makes a contender of its own: they name methods.
-    const METHODS: [&str; 4] = ["method", "normalise", "moments", "opacity"];
+    const METHODS: [&str; 5] = ["method", "normalise", "moments", "opacity", "per"];
+
+    /// Whether a design has a parameter that can be any of the counts.
+    fn counts(entry: &Entry, name: &str) -> bool {
+        let param = entry.info.params.iter().find(|p| p.name == name);
+        let reaches = |max: i64| COUNTS.iter().all(|count| i64::from(*count) <= max);
+        param.is_some_and(|p| matches!(p.kind, Kind::Integer { max, .. } if reaches(max)))
+    }
 
     /// A design of the registry with settings, and what follows the count.
     fn series(entry: &Entry, settings: &[(&str, &str)]) -> String {
-        let has = |name: &str| entry.info.params.iter().any(|p| p.name == name);
         // Wyman's figure 1: twice as many coverage bits as layers.
-        let counted =
-            [("layers", "{n}"), ("bits", "{2n}")].into_iter().filter(|(name, _)| has(name));
+        let counted = [("layers", "{n}"), ("bits", "{2n}")];
+        let counted = counted.into_iter().filter(|(name, _)| counts(entry, name));
         let all = settings.iter().copied().chain(counted);
         let list: Vec<String> = all.map(|(name, value)| format!("{name}={value}")).collect();
         let separator = if list.is_empty() { "" } else { ":" };
@@ -93,7 +99,12 @@ mod tests {
                 let others = options.iter().filter(|o| o.name != param.default);
                 list.extend(others.map(|o| series(entry, &[(param.name, o.name)])));
             }
-            if entry.info.params.iter().any(|p| p.name == "mask") {
+            // A few layers where there cannot be as many as samples.
+            let has = |name: &str| entry.info.params.iter().any(|p| p.name == name);
+            if has("layers") && !counts(entry, "layers") {
+                list.push(series(entry, &[("layers", "4")]));
+            }
+            if has("mask") {
                 list.push(series(entry, &[("mask", "naive")]));
             }
         }
