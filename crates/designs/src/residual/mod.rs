@@ -112,7 +112,8 @@ impl Blueprint for Residual {
 
     fn port<const N: usize>(values: &Values, frame: &Frame) -> Result<Option<Port>> {
         let plain = Self::at::<N>(values, frame)?;
-        Ok(Some(Port::of(shader!("residual"), &Self::INFO, values, frame, plain)))
+        let shader = shader!("residual");
+        stochastic::port_of_single_pass(shader, &Self::INFO, values, frame, plain).map(Some)
     }
 
     fn promises(values: &Values) -> Promises {

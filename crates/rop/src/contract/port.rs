@@ -97,7 +97,7 @@ impl fmt::Debug for Port {
 
 /// Parameters as constants: `SORT` of a flag, `SURFACES_BITMASK` and others of which one
 /// is true of a choice, `LAYERS` of a number.
-fn of_parameters(params: &[Param], values: &Values) -> Vec<(String, Constant)> {
+pub(crate) fn of_parameters(params: &[Param], values: &Values) -> Vec<(String, Constant)> {
     let name = |text: &str| text.replace('-', "_").to_uppercase();
     let mut list = Vec::new();
     for (param, value) in values.iter() {

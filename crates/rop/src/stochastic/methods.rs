@@ -13,7 +13,7 @@ use crate::contract::frame::{Frame, Site};
 use crate::contract::info::Info;
 use crate::contract::layout::Layout;
 use crate::contract::over_opaque::{self, Opaque, OverOpaque, Transparent};
-use crate::contract::port::Port;
+use crate::contract::port::{Port, of_parameters};
 use crate::contract::promise::Promise;
 use crate::contract::promises::{OpaquePromise, OrderPromise, Promises};
 use crate::contract::samples::Samples;
@@ -22,7 +22,7 @@ use crate::contract::words::{Constant, Declaration, OnDevice, PixelWords};
 use crate::resolve::box_filter;
 use crate::stochastic::depth_bits;
 use screendoor_trace::error::Result;
-use screendoor_trace::param::{Typed, Values};
+use screendoor_trace::param::{Param, Typed, Values};
 use screendoor_trace::random::hash;
 use screendoor_trace::trace::{Fragment, SampleMask, Unorm32};
 
@@ -209,6 +209,29 @@ where
     port.resolves = resolves;
     port.by_sample = resolves && by_sample;
     port
+}
+
+/// The port of a design made by [`single_pass`]: the parameters that it does not have are what
+/// they are by default.
+///
+/// # Errors
+/// None today; as [`Values::resolve`].
+pub fn port_of_single_pass<S, const N: usize>(
+    program: Shader,
+    info: &Info,
+    values: &Values,
+    frame: &Frame,
+    plain: Stochastic<S, N>,
+) -> Result<Port>
+where
+    S: Sampler<N> + OnDevice<S::State> + Clone + 'static,
+    S::State: Send,
+{
+    const ABSENT: &[Param] = &[METHOD.param, STRATA.param];
+    let mut port = Port::of(program, info, values, frame, plain);
+    let defaults = Values::resolve(info.name, ABSENT, &[])?;
+    port.constants.append(&mut of_parameters(ABSENT, &defaults));
+    Ok(port)
 }
 
 /// What a design promises with the shared parameters, of which the single pass
