@@ -242,7 +242,7 @@ where
         let [first, others @ ..] = &self.0[..] else { return 0 };
         let mut sum = *first;
         for vector in others {
-            sum = sum + *vector;
+            sum += *vector;
         }
         sum.reduce_sum()
     }
