@@ -257,8 +257,8 @@ fn captured_scenes_give_the_same_bits_in_chunks_of_any_size() {
         let trace = Capture::new(&loaded, &size).unwrap().to_memory(|_, _| ()).unwrap();
         for (i, design) in STOCHASTIC.iter().map(|spec| design(spec)).enumerate() {
             // One in five keeps nothing on the device, one has a single chunk.
-            let rows = [u64::MAX, 1000, 4096, 777, 5000][i];
-            let resident = [u64::MAX, 0, 100_000, u64::MAX, 0][i];
+            let rows = [u64::MAX, 1000, 4096, 777, 5000][i % 5];
+            let resident = [u64::MAX, 0, 100_000, u64::MAX, 0][i % 5];
             let options =
                 GpuOptions { rows: rows.max(trace.rows() / 20), resident, ..GpuOptions::default() };
             let [found, expected] = pictures(gpu, &design, &trace, 8, &options);
