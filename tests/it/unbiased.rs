@@ -46,10 +46,19 @@ fn cases(samples: u32) -> Vec<Case> {
     let near_first = layered(&header, 6, |i| {
         (20 * (i + 1), colour(i), [0.3, 0.5, 0.2, 0.7, 0.4, 0.6][i as usize])
     });
-    // More layers than anyone keeps or merges well, of an alpha that 10 bits round down.
+    // More layers than most keep, of an alpha that 10 bits round down.
     let small = util::header(12, 12, samples);
-    let deep = layered(&small, 100, |i| (i * 37 % 100, colour(i), 30.45 / 1023.0));
+    let deep = layered(&small, 40, |i| (i * 7 % 40, colour(i), 30.45 / 1023.0));
     cases.push(("deep", small.clone(), deep));
+    // More than anyone keeps, the brighter the further, far apart and in an order in which they
+    // fall between each other: where two are merged before others come between, all that is
+    // wrong is wrong in one direction.
+    let few = util::header(6, 6, samples);
+    let brighter = layered(&few, 100, |i| {
+        let place = i * 37 % 100;
+        ((place + 1) << 24, [place as f32 / 100.0; 3], 0.03)
+    });
+    cases.push(("brighter", few, brighter));
     let mut far_first = near_first.clone();
     far_first.reverse();
     cases.push(("near first", header.clone(), near_first));
