@@ -10,8 +10,9 @@ use std::sync::Arc;
 
 use screendoor_rop::layers::{DEPTH_BITS, Deep, LAYERS, nearer, room};
 use screendoor_rop::shader;
+use screendoor_rop::view_depth::fraction;
 use screendoor_rop::{
-    Blueprint, ColourStore, Contents, Declaration, Family, Frame, Info, Layout, OnDevice,
+    Blueprint, ColourStore, Contents, Declaration, Family, Frame, Info, Layout, NoProbe, OnDevice,
     OpaquePromise, OrderPromise, OverOpaque, PixelWords, Port, Probe, Promises, Site, Transparent,
     colour, over_opaque,
 };
@@ -274,7 +275,8 @@ impl<const N: usize> MergingAt<N> {
         let i = self.cheapest(sheets, probe);
         let merged = self.merged(&sheets[i], &sheets[i + 1], word);
         sheets.drain(i..i + 2);
-        let place = sheets.iter().take_while(|s| s.depth < merged.depth).count();
+        // Among depths that were compared when its parts came.
+        let place = nearer(sheets, merged.depth, &mut NoProbe);
         sheets.insert(place, merged);
         // All are read for their costs; written is each place that holds something else.
         let written = before.iter().zip(&*sheets).filter(|(old, new)| old != new).count() as u32;
@@ -341,11 +343,10 @@ impl<const N: usize> Transparent<N> for MergingAt<N> {
     fn contents(&self, sheets: &Vec<Sheet>) -> Contents {
         let text = |l: &Sheet| {
             let colour = l.colour.map(|c| format!("{c:.3}")).join(" ");
-            let z = f64::from(l.depth.0) / f64::from(u32::MAX);
+            let z = fraction(l.depth);
             format!("z {z:.6} rgb {colour} a {:.3} in {:#x}", l.alpha, l.coverage.0)
         };
-        let words: Vec<String> = sheets.iter().map(text).collect();
-        let text = if words.is_empty() { "none".into() } else { words.join("; ") };
+        let text = Contents::list(sheets.iter().map(text));
         Contents { samples: Vec::new(), fields: vec![("layers", text)] }
     }
 }
@@ -390,7 +391,6 @@ impl<const N: usize> OnDevice<Vec<Sheet>> for MergingAt<N> {
 mod tests {
     use super::*;
     use crate::configure;
-    use screendoor_rop::NoProbe;
     use screendoor_trace::tile::TileGrid;
 
     const SITE: Site = Site { x: 0, y: 0 };

@@ -106,7 +106,7 @@ impl Blueprint for Systematic {
     }
 
     fn promises(values: &Values) -> Promises {
-        let scrambled = values.get(DITHER) != Dither::Sequence || values.get(REFERENCE).scrambles();
+        let scrambled = values.get(DITHER).scrambles(values.get(REFERENCE));
         let apart = depth_bits::tells_apart(values);
         let basic = Promises {
             unbiased: Promise::always_if(apart && scrambled && !chance_decides_surfaces(values)),

@@ -11,8 +11,10 @@ screendoor_trace::options! {
     }
 }
 
-/// Which bit of ξ exchanges the samples of a pair.
-const BITS: u32 = 16;
+/// A bit of ξ for each pair of samples, which exchanges them: the lower half twice.
+pub(super) fn exchanges(xi: u32) -> u32 {
+    xi & 0xffff | xi << 16
+}
 
 /// The reference value of the `n`-th sample: teeth of a comb, a threshold apart, so that as
 /// nearly as can be `α·n` of `n` samples pass; all moved by `xi`.
@@ -22,7 +24,7 @@ const BITS: u32 = 16;
 /// pair. Given its bit, ξ is uniform over half of the words: a sample of pair `p` passes with
 /// a probability within 2^(p − 32) of α, `p` modulo 16.
 pub(super) fn paired(xi: u32, n: u32, threshold: Threshold) -> u32 {
-    comb(xi, n ^ (xi >> (n / 2 % BITS) & 1), threshold)
+    comb(xi, n ^ (exchanges(xi) >> (n / 2) & 1), threshold)
 }
 
 /// The `n`-th tooth of the comb.

@@ -4,7 +4,7 @@
 //! the background's, and coverage. They are signed, in units of 2^-20 of a sample, and so small
 //! that 32 bits hold each and every product is one of 32 bits with 32, as a device has it.
 
-use screendoor_rop::{Probe, Threshold};
+use screendoor_rop::{Layout, Probe, Threshold};
 use screendoor_trace::random::{GOLDEN, hash};
 use screendoor_trace::trace::SampleMask;
 
@@ -148,6 +148,13 @@ impl Store {
             return ((threshold as i64 * i64::from(x)) >> 32) as i32;
         }
         share(threshold, x)
+    }
+
+    /// What a pixel keeps: entries, and how many fragments there were.
+    pub(super) fn layout(&self) -> Layout {
+        let sums = 4 * self.parts as u32 * self.width.bits();
+        let entry = [(32, "depth"), (16, "mass"), (sums, "error sums")];
+        Layout::of(1, &[(32, "fragments")]).and(self.layers as u32, &entry)
     }
 
     /// The samples of a part.

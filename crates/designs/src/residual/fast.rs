@@ -4,7 +4,7 @@
 
 use fearless_simd::Simd;
 
-use crate::residual::choice::Drawing;
+use crate::residual::choice::{Drawing, exchanges};
 use crate::residual::errors::{
     Entry, Sums, Width, attenuated, centre, mass_of, of_pixel, share, shown,
 };
@@ -20,7 +20,7 @@ pub(super) struct FastResidual<W: fast::Width, const N: usize> {
     plain: ResidualSampler<N>,
     /// Each number's place in the comb, and by how much an exchange moves it.
     places: [W::Row; 2],
-    /// How far the number's bit of ξ lies from the upper one.
+    /// How far the number's bit of [`exchanges`] lies from the upper one.
     bits: W::Row,
 }
 
@@ -125,7 +125,7 @@ where
         // The samples' numbers pass or not, before it is known which sample has which.
         let load = |row: &<Count<N> as fast::Width>::Row| L::load(simd, row.as_ref());
         let step = L::splat(simd, threshold as u32 as i32);
-        let exchange = L::splat(simd, (xi & 0xffff | xi << 16) as i32);
+        let exchange = L::splat(simd, exchanges(xi) as i32);
         let exchange = exchange.shift_left_by(load(&self.bits)).negative(simd);
         let [place, move_by] = [load(&self.places[0]), load(&self.places[1])];
         let place = L::select(exchange, place.add(move_by), place);

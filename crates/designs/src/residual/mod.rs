@@ -28,8 +28,9 @@ use self::fast::FastResidual;
 use screendoor_rop::fast::{self as fast_kit, Count, FastEngine};
 use screendoor_rop::shader;
 use screendoor_rop::tracked::{PIXEL_ORDER, REFERENCE, SORT};
+use screendoor_rop::view_depth::fraction;
 use screendoor_rop::{
-    Blueprint, ColourStore, Declaration, Dither, Family, Frame, Info, Layout, OnDevice,
+    Blueprint, ColourStore, Contents, Declaration, Dither, Family, Frame, Info, Layout, OnDevice,
     OpaquePromise, OrderPromise, PixelIndex, PixelOrder, PixelWords, Port, Probe, Promise,
     Promises, Reference, ReferenceKey, Round, SampleList, Sampler, Samples, Site, Stochastic,
     Threshold, TiledDesign, colour, depth_bits, in_sample_order, sort_by_stored_depth, stochastic,
@@ -117,9 +118,10 @@ impl Blueprint for Residual {
     }
 
     fn promises(values: &Values) -> Promises {
+        let reference = values.get(REFERENCE);
         let scrambled = match values.get(DRAWN) {
-            Drawing::Paired if values.get(DITHER) != Dither::Sequence => true,
-            _ => values.get(REFERENCE).scrambles(),
+            Drawing::Paired => values.get(DITHER).scrambles(reference),
+            Drawing::Hashed => reference.scrambles(),
         };
         let chance = scrambled && depth_bits::tells_apart(values);
         // Sums of 16 bits are rounded to nearest, which is a bias, if a small one.
@@ -169,15 +171,17 @@ impl<const N: usize> ResidualSampler<N> {
             Per::Pixel => 1,
             Per::Sample => N,
         };
-        let mut sampler = ResidualSampler {
-            store: Store {
-                samples: N as u32,
-                parts,
-                layers: values.get(LAYERS) as usize,
-                width: values.get(ERRORS),
-                #[cfg(test)]
-                flaw: None,
-            },
+        let store = Store {
+            samples: N as u32,
+            parts,
+            layers: values.get(LAYERS) as usize,
+            width: values.get(ERRORS),
+            #[cfg(test)]
+            flaw: None,
+        };
+        ResidualSampler {
+            state_bits: store.layout().bits().extra,
+            store,
             drawing: values.get(DRAWN),
             dither: values.get(DITHER),
             reference: values.get(REFERENCE),
@@ -188,10 +192,7 @@ impl<const N: usize> ResidualSampler<N> {
             grid: frame.grid,
             positions: frame.positions.clone(),
             background: frame.background,
-            state_bits: 0,
-        };
-        sampler.state_bits = sampler.layout().bits().extra;
-        sampler
+        }
     }
 
     /// A colour less the background's, and 1, in units of 2^-20.
@@ -237,13 +238,11 @@ impl<const N: usize> ResidualSampler<N> {
         }
         // With a hash a sample another one is needed for rounding alone.
         let at_random = u32::from(self.store.width == Width::Byte);
-        probe.hashed(
-            at_random
-                + match self.drawing {
-                    Drawing::Paired => 1,
-                    Drawing::Hashed => list.len() as u32,
-                },
-        );
+        let chosen_by = match self.drawing {
+            Drawing::Paired => 1,
+            Drawing::Hashed => list.len() as u32,
+        };
+        probe.hashed(chosen_by + at_random);
         written
     }
 
@@ -337,7 +336,7 @@ impl<const N: usize> ResidualSampler<N> {
 
 /// A depth as `explain` shows it.
 fn depth(z: u32) -> String {
-    format!("{:.6}", f64::from(z) / f64::from(u32::MAX))
+    format!("{:.6}", fraction(Unorm32(z)))
 }
 
 impl<const N: usize> Sampler<N> for ResidualSampler<N> {
@@ -353,9 +352,7 @@ impl<const N: usize> Sampler<N> for ResidualSampler<N> {
     }
 
     fn layout(&self) -> Layout {
-        let sums = 4 * self.store.parts as u32 * self.store.width.bits();
-        let entry = [(32, "depth"), (16, "mass"), (sums, "error sums")];
-        Layout::of(1, &[(32, "fragments")]).and(self.store.layers as u32, &entry)
+        self.store.layout()
     }
 
     fn choose<P: Probe>(
@@ -398,8 +395,7 @@ impl<const N: usize> Sampler<N> for ResidualSampler<N> {
             let (z, mass) = (depth(entry.z), f64::from(entry.mass) / f64::from(1 << 15));
             format!("z {z} rgb {r:+.4} {g:+.4} {b:+.4} coverage {coverage:+.4}, mass {mass:.3}")
         };
-        let errors: Vec<String> = p.errors.iter().map(words).collect();
-        let errors = if errors.is_empty() { "none".into() } else { errors.join("; ") };
+        let errors = Contents::list(p.errors.iter().map(words));
         vec![("fragments", p.fragments.to_string()), ("errors", errors)]
     }
 }

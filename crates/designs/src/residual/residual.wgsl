@@ -1,6 +1,6 @@
 // Twin of crates/designs/src/residual/mod.rs and errors.rs: samples less the error that chance
 // makes of them.
-// uses: dither opacity over_opaque pixel_order replay resolve stochastic
+// uses: dither opacity over_opaque pixel_order random replay resolve stochastic
 
 const POINT: u32 = 20u;
 const MASS: u32 = 15u;
@@ -15,7 +15,6 @@ const BELOW: u32 = select(
 );
 const GREATEST: i32 = select(127, 32767, ERRORS_16);
 const ROUNDING: u32 = 0x0d174e12u;
-const GOLDEN_STEP: u32 = 0x9e3779b9u;
 // Colours less the background's are cut there.
 const MOST: f32 = f32((1u << 29u) / SAMPLES);
 
@@ -259,7 +258,7 @@ fn round_sums(xi: u32) {
         for (var j = 0u; j < 4u; j++) {
             var dither = 1u << ((BELOW - 1u) & 31u);
             if ERRORS_8 {
-                dither = (first + GOLDEN_STEP * (4u * i + j)) >> ((32u - BELOW) & 31u);
+                dither = (first + GOLDEN * (4u * i + j)) >> ((32u - BELOW) & 31u);
             }
             let whole = saturating_add(sums[i][j], bitcast<i32>(dither)) >> (BELOW & 31u);
             sums[i][j] = clamp(whole, -GREATEST, GREATEST) << (BELOW & 31u);

@@ -13,6 +13,14 @@ pub struct Contents {
     pub fields: Vec<(&'static str, String)>,
 }
 
+impl Contents {
+    /// A list as a value of a field: whoever shows it may part it at '; '.
+    pub fn list(items: impl IntoIterator<Item = String>) -> String {
+        let items: Vec<String> = items.into_iter().collect();
+        if items.is_empty() { "none".into() } else { items.join("; ") }
+    }
+}
+
 /// What a sample holds.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct SampleContents {

@@ -317,8 +317,7 @@ impl<const N: usize> OnDevice<Vec<Layer>> for Layering<N> {
 
 /// Layers as `explain` shows them.
 pub fn contents<'a>(layers: impl IntoIterator<Item = &'a Layer>) -> Contents {
-    let words: Vec<String> = layers.into_iter().map(Layer::words).collect();
-    let text = if words.is_empty() { "none".into() } else { words.join("; ") };
+    let text = Contents::list(layers.into_iter().map(Layer::words));
     Contents { samples: Vec::new(), fields: vec![("layers", text)] }
 }
 

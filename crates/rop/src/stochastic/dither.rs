@@ -38,6 +38,12 @@ impl Dither {
         }
     }
 
+    /// Whether two surfaces of a pixel get unrelated values, where those along the curve are
+    /// made as `reference` says.
+    pub fn scrambles(self, reference: Reference) -> bool {
+        self != Dither::Sequence || reference.scrambles()
+    }
+
     /// ξ of a surface in a pixel, as a 32-bit fraction of 1: uniform over the seeds,
     /// and independent from surface to surface.
     pub fn value(self, site: Site, key: &ReferenceKey, reference: Reference) -> u32 {
