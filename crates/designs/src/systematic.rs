@@ -5,14 +5,21 @@
 //! `(ξ + T·(k+1)) mod 2^32 < T`: systematic sampling (Madow 1949), the sum of T
 //! passing a multiple of 2^32. Any run of m samples in a row passes ⌊αm⌋ or ⌈αm⌉
 //! times, for every m, where LK's values have that for aligned powers of two.
+//!
+//! At an α near 1/2 every other sample passes; the next surface, whose samples come in the
+//! order of what those left, takes every other of them again: the same of two patterns
+//! over and over, which aliases where there are enough samples for it. So within a fragment the
+//! two samples of each pair exchange their places in the row at random (`exchange`), by bits that
+//! are made of the phase at which it starts. Elsewhere that only blurs what the row keeps even.
 
 use fearless_simd::{Level, Simd};
 
 use screendoor_rop::fast::{
     Base, Count, FastEngine, FastReferences, FastTracked, Lanes, Limit, Loaded, Numbered,
-    Parameterised, Published, Tally, Width, below, is_published,
+    Parameterised, Published, Tally, Width, below, is_published, teeth,
 };
 use screendoor_rop::shader;
+use screendoor_rop::stochastic::comb::{among, comb, exchanged, exchanges};
 use screendoor_rop::stochastic::{self, COMBINATIONS, METHOD, OPAQUE, ROUNDS, STRATA};
 use screendoor_rop::tracked::{
     COMPACT, PIXEL_ORDER, PREHASH, REFERENCE, References, SORT, SURFACES, SampleOf, TRACK,
@@ -21,7 +28,7 @@ use screendoor_rop::tracked::{
 use screendoor_rop::{
     Blueprint, Declaration, Dither, Family, Frame, Info, OnDevice, OpaquePromise, OrderPromise,
     PixelWords, Port, Probe, Promise, Promises, Reference, ReferenceKey, Round, Site, Stochastic,
-    TiledDesign, colour, depth_bits,
+    Threshold, TiledDesign, colour, depth_bits,
 };
 use screendoor_trace::error::Result;
 use screendoor_trace::param::{Typed, Values};
@@ -34,9 +41,38 @@ screendoor_trace::options! {
     }
 }
 
+screendoor_trace::options! {
+    /// Where the two samples of each pair of a fragment exchange their places at random.
+    pub enum Exchange {
+        Never = "never": "nowhere: aliases at an alpha of 1/2",
+        Half = "half": "with more than 16 samples and alpha within half a sample's share of 1/2",
+        Always = "always": "everywhere",
+    }
+}
+
+impl Exchange {
+    /// Whether it is done with a threshold in pixels of so many samples.
+    #[inline(always)]
+    fn holds(self, threshold: Threshold, samples: usize) -> bool {
+        const HALF: u64 = 1 << 31;
+        match self {
+            Exchange::Never => false,
+            Exchange::Half => {
+                samples > FEW && threshold.value().abs_diff(HALF) <= HALF / samples as u64
+            }
+            Exchange::Always => true,
+        }
+    }
+}
+
+/// So many samples are too few to alias.
+const FEW: usize = 16;
+
 const PHASE: Typed<Phase> = Typed::choice("phase", "sum", "how the samples of a surface follow");
 const DITHER: Typed<Dither> =
     Typed::choice("dither", "sequence", "how xi is spread over the pixels");
+const EXCHANGE: Typed<Exchange> =
+    Typed::choice("exchange", "half", "where the two samples of a pair exchange places at random");
 
 /// The design's entry in the registry.
 pub struct Systematic;
@@ -50,6 +86,7 @@ impl Blueprint for Systematic {
         params: &[
             PHASE.param,
             DITHER.param,
+            EXCHANGE.param,
             SORT.param,
             COMPACT.param,
             SURFACES.param,
@@ -89,6 +126,7 @@ impl Blueprint for Systematic {
         let references = Evenly::of(values);
         let summed_along_the_curve = references.phase == Phase::Sum
             && references.dither == Dither::Sequence
+            && references.exchange == Exchange::Half
             && is_published(values);
         if summed_along_the_curve {
             let sampler = FastTracked::<_, _, N>::new(values, Published, Summed);
@@ -133,6 +171,7 @@ impl Blueprint for Systematic {
 pub struct Evenly {
     phase: Phase,
     dither: Dither,
+    exchange: Exchange,
     reference: Reference,
 }
 
@@ -141,8 +180,15 @@ impl Evenly {
         Evenly {
             phase: values.get(PHASE),
             dither: values.get(DITHER),
+            exchange: values.get(EXCHANGE),
             reference: values.get(REFERENCE),
         }
+    }
+
+    /// Which of a fragment's pairs exchange their places, by the phase at which it starts.
+    #[inline(always)]
+    fn exchanges<const N: usize>(&self, start: u32, threshold: Threshold, count: u32) -> u32 {
+        if self.exchange.holds(threshold, N) { among(exchanges(start), count) } else { 0 }
     }
 }
 
@@ -156,25 +202,24 @@ impl References for Evenly {
         n: u32,
         of: &SampleOf<'_>,
     ) -> (u32, u32) {
-        let again = self.phase == Phase::Count && of.first;
+        let again = self.phase == Phase::Count && of.place == 0;
         let (before, hashes) = match *kept {
             Some(phase) if !again => (phase, 0),
             _ => (self.dither.in_round(of.round, of.site, of.key, self.reference), 1),
         };
         // Modulo 2^32: an opaque fragment's threshold, 2^32, leaves the phase as it is.
         let threshold = of.opacity.value() as u32;
-        match self.phase {
-            Phase::Sum => {
-                let phase = before.wrapping_add(threshold);
-                *kept = Some(phase);
-                (phase, hashes)
-            }
-            Phase::Count => {
-                *kept = Some(before);
-                let steps = threshold.wrapping_mul(n + 1);
-                (before.wrapping_add(steps), hashes)
-            }
-        }
+        // Where the fragment's first sample starts, and what is kept after this one.
+        let (start, after) = match self.phase {
+            Phase::Sum => (
+                before.wrapping_sub(threshold.wrapping_mul(of.place)),
+                before.wrapping_add(threshold),
+            ),
+            Phase::Count => (before.wrapping_add(threshold.wrapping_mul(n - of.place)), before),
+        };
+        *kept = Some(after);
+        let place = exchanged(of.place, self.exchanges::<N>(start, of.opacity, of.count));
+        (comb(start, place, of.opacity), hashes)
     }
 
     fn kept_bits(&self) -> u32 {
@@ -241,17 +286,20 @@ impl<const N: usize> FastReferences<N> for Evenly {
         };
         let end = start.wrapping_add(threshold.wrapping_mul(count));
         *kept = Some(if self.phase == Phase::Sum { end } else { xi });
-        evenly(simd, loaded, start, limit)
+        let exchanges = self.exchanges::<N>(start, of.opacity, count);
+        evenly(simd, loaded, (start, exchanges), limit)
     }
 }
 
-/// Which of a run of samples pass whose phases follow `start` in even steps.
+/// Which of a run of samples pass whose phases follow a start in even steps, pairs exchanged.
 #[inline(always)]
-fn evenly<S: Simd, L: Lanes<S>>(simd: S, loaded: &Loaded<L>, start: u32, limit: Limit) -> u64 {
-    let threshold = limit.threshold().value() as u32;
-    let steps = loaded.lanes.mul(L::splat(simd, threshold as i32));
-    let first = L::splat(simd, start.wrapping_add(threshold) as i32);
-    below(simd, steps.add(first), limit)
+fn evenly<S: Simd, L: Lanes<S>>(
+    simd: S,
+    loaded: &Loaded<L>,
+    (start, exchanges): (u32, u32),
+    limit: Limit,
+) -> u64 {
+    below(simd, teeth(simd, loaded, start, exchanges, limit.threshold()), limit)
 }
 
 /// [`Evenly`] with the parameters that it has by default, known when the kernel is
@@ -297,7 +345,9 @@ impl<const N: usize> FastReferences<N> for Summed {
             (false, false) => first(base),
         };
         *kept = (start.wrapping_add(threshold.wrapping_mul(count)), begun || count > 0);
-        evenly(simd, loaded, start, limit)
+        let exchange = Exchange::Half.holds(limit.threshold(), N);
+        let exchanges = if exchange { among(exchanges(start), count) } else { 0 };
+        evenly(simd, loaded, (start, exchanges), limit)
     }
 }
 
@@ -311,20 +361,24 @@ fn first(base: Base) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use screendoor_rop::{PixelIndex, Threshold};
+    use screendoor_rop::PixelIndex;
     use screendoor_trace::random::Stream;
 
+    /// Evenly spaced values.
+    fn evenly(phase: Phase, exchange: Exchange) -> Evenly {
+        Evenly { phase, dither: Dither::White, exchange, reference: Reference::Lk2011 }
+    }
+
     /// Which of a surface's samples pass, their alphas given fragment by fragment.
-    fn passes(phase: Phase, seed: u32, fragments: &[(f32, usize)]) -> Vec<bool> {
-        let evenly = Evenly { phase, dither: Dither::White, reference: Reference::Lk2011 };
+    fn passes(evenly: Evenly, seed: u32, fragments: &[(f32, u32)]) -> Vec<bool> {
         let key = ReferenceKey { pixel: PixelIndex(5), surface: 0, seed };
         let round = Round { index: 0, count: 1, seed };
         let (mut kept, mut n, mut list) = (None, 0, Vec::new());
         for (alpha, samples) in fragments {
             let opacity = Threshold::of(*alpha);
-            for i in 0..*samples {
-                let site = Site { x: 0, y: 0 };
-                let of = SampleOf { site, key: &key, round, opacity, first: i == 0 };
+            for place in 0..*samples {
+                let (site, count) = (Site { x: 0, y: 0 }, *samples);
+                let of = SampleOf { site, key: &key, round, opacity, place, count };
                 let (reference, _) = evenly.value::<64>(&mut kept, n, &of);
                 list.push(opacity.passes(reference));
                 n += 1;
@@ -338,8 +392,11 @@ mod tests {
         for seed in 0..50 {
             for alpha in [0.0, 0.01, 0.3, 0.5, 0.61, 0.999, 1.0] {
                 for phase in [Phase::Sum, Phase::Count] {
-                    let list = passes(phase, seed, &[(alpha, 64)]);
+                    let list = passes(evenly(phase, Exchange::Never), seed, &[(alpha, 64)]);
+                    let exchanged = passes(evenly(phase, Exchange::Always), seed, &[(alpha, 64)]);
                     for (start, end) in (0..64).flat_map(|a| (a + 1..=64).map(move |b| (a, b))) {
+                        // Pairs are whole or not at all.
+                        let list = if start % 2 == 0 && end % 2 == 0 { &exchanged } else { &list };
                         let count = list[start..end].iter().filter(|p| **p).count() as f64;
                         let expected = f64::from(alpha) * (end - start) as f64;
                         // Thresholds round alpha up by less than 2^-32.
@@ -356,13 +413,14 @@ mod tests {
         let mut worst = [0.0_f64; 2];
         let (mut means, mut expected_mean) = ([0.0; 2], 0.0);
         for seed in 0..4000 {
-            let fragments: Vec<(f32, usize)> =
-                (0..8).map(|_| (random.unit(), 1 + random.below(7) as usize)).collect();
+            let fragments: Vec<(f32, u32)> =
+                (0..8).map(|_| (random.unit(), 1 + random.below(7))).collect();
             let expected: f64 =
-                fragments.iter().map(|(alpha, n)| f64::from(*alpha) * *n as f64).sum();
+                fragments.iter().map(|(alpha, n)| f64::from(*alpha) * f64::from(*n)).sum();
             expected_mean += expected;
             for (i, phase) in [Phase::Sum, Phase::Count].into_iter().enumerate() {
-                let count = passes(phase, seed, &fragments).iter().filter(|p| **p).count();
+                let list = passes(evenly(phase, Exchange::Always), seed, &fragments);
+                let count = list.iter().filter(|p| **p).count();
                 worst[i] = worst[i].max((count as f64 - expected).abs());
                 means[i] += count as f64;
             }
@@ -373,5 +431,16 @@ mod tests {
         for mean in means {
             assert!((mean - expected_mean).abs() / 4000.0 < 0.15, "{mean} of {expected_mean}");
         }
+    }
+
+    #[test]
+    fn at_an_alpha_of_a_half_two_patterns_become_many() {
+        let patterns = |exchange| {
+            let of = |seed| passes(evenly(Phase::Sum, exchange), seed, &[(0.5, 8)]);
+            (0..64).map(of).collect::<std::collections::HashSet<_>>().len()
+        };
+        // Of 2^4 with four pairs.
+        let found = [Exchange::Never, Exchange::Half, Exchange::Always].map(patterns);
+        assert_eq!(found, [2, 16, 16]);
     }
 }

@@ -1,11 +1,12 @@
 // Twin of crates/designs/src/systematic.rs: evenly spaced reference values.
-// uses: dither over_opaque replay resolve stochastic tracked
+// uses: comb dither over_opaque replay resolve stochastic tracked
 
 // The last phase of the surface, and whether it has one. Where places are counted, ξ.
 var<private> phase: u32;
 var<private> begun: bool;
-// Where the fragment's samples start.
+// Where the fragment's samples start, and which of its pairs exchange their places.
 var<private> start: u32;
+var<private> pairs: u32;
 
 fn references_clear() {
     if PHASE_SUM {
@@ -33,6 +34,13 @@ fn references_start() {
     begun = false;
 }
 
+// Exchange::holds.
+fn exchanges_pairs(opacity: Threshold) -> bool {
+    let away = select(0x80000000u - opacity.low, opacity.low - 0x80000000u, opacity.low > 0x80000000u);
+    let near = SAMPLES > 16u && away <= 0x80000000u / SAMPLES;
+    return EXCHANGE_ALWAYS || (EXCHANGE_HALF && near);
+}
+
 // Modulo 2^32: an opaque fragment's threshold, 2^32, leaves the phase as it is.
 fn references_begin(round: Round, key: ReferenceKey, opacity: Threshold, number: u32, count: u32) {
     if count == 0u {
@@ -49,8 +57,9 @@ fn references_begin(round: Round, key: ReferenceKey, opacity: Threshold, number:
         let xi = dither_in_round(site.x, site.y, key, round.index, round.count_log2);
         start = xi + opacity.low * number;
     }
+    pairs = select(0u, among(exchanges(start), count), exchanges_pairs(opacity));
 }
 
 fn reference_of(round: Round, key: ReferenceKey, opacity: Threshold, number: u32, place: u32) -> u32 {
-    return start + opacity.low * (place + 1u);
+    return comb(start, exchanged(place, pairs), opacity);
 }

@@ -7,6 +7,7 @@ use crate::shader;
 /// file of the same name.
 pub const SHADERS: &[Shader] = &[
     shader!("contract/", "colour"),
+    shader!("stochastic/", "comb"),
     shader!("stochastic/", "dither"),
     shader!("layered/", "layered"),
     shader!("layered/", "layers"),

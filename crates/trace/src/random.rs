@@ -26,7 +26,12 @@ pub const GOLDEN: u32 = 0x9e37_79b9;
 /// The hash of a list of words; it depends on their order.
 #[inline]
 pub const fn hash<const N: usize>(words: [u32; N]) -> u32 {
-    let mut h = GOLDEN;
+    hash_on(GOLDEN, words)
+}
+
+/// The hash of a longer list: `h` is that of the words before, `words` are the rest.
+#[inline]
+pub const fn hash_on<const N: usize>(mut h: u32, words: [u32; N]) -> u32 {
     let mut i = 0;
     while i < N {
         h = mix((h ^ words[i]).wrapping_add(GOLDEN));

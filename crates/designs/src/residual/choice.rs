@@ -2,6 +2,7 @@
 //! depths, or a hash for each.
 
 use screendoor_rop::Threshold;
+use screendoor_rop::stochastic::comb::{comb, exchanged, exchanges};
 
 screendoor_trace::options! {
     /// How reference values are made.
@@ -11,25 +12,10 @@ screendoor_trace::options! {
     }
 }
 
-/// A bit of ξ for each pair of samples, which exchanges them: the lower half twice.
-pub(super) fn exchanges(xi: u32) -> u32 {
-    xi & 0xffff | xi << 16
-}
-
-/// The reference value of the `n`-th sample: teeth of a comb, a threshold apart, so that as
-/// nearly as can be `α·n` of `n` samples pass; all moved by `xi`.
-///
-/// Even teeth alone would take every other sample at an alpha of 1/2, and the next surface
-/// every other of those, or of the rest. So the low bits of `xi` exchange the samples of each
-/// pair. Given its bit, ξ is uniform over half of the words: a sample of pair `p` passes with
-/// a probability within 2^(p − 32) of α, `p` modulo 16.
+/// The reference value of the `n`-th sample: the comb's, of which pairs have exchanged their
+/// teeth at random.
 pub(super) fn paired(xi: u32, n: u32, threshold: Threshold) -> u32 {
-    comb(xi, n ^ (exchanges(xi) >> (n / 2) & 1), threshold)
-}
-
-/// The `n`-th tooth of the comb.
-pub(super) fn comb(xi: u32, n: u32, threshold: Threshold) -> u32 {
-    xi.wrapping_add((threshold.value() as u32).wrapping_mul(n + 1))
+    comb(xi, exchanged(n, exchanges(xi)), threshold)
 }
 
 #[cfg(test)]

@@ -272,9 +272,19 @@ impl Store {
     /// Fractions of the pixel by which what shows is more than right: red, green, blue and
     /// coverage.
     pub(super) fn of_whole_pixel(&self, entries: &[Entry]) -> [f64; 4] {
+        self.fractions(entries.iter().flat_map(|entry| &entry.parts))
+    }
+
+    /// The same of the sums themselves.
+    pub(super) fn fractions<'a>(&self, sums: impl Iterator<Item = &'a Sums>) -> [f64; 4] {
         let unit = f64::from(1 << POINT) * f64::from(self.samples);
-        let parts = || entries.iter().flat_map(|entry| &entry.parts);
-        std::array::from_fn(|j| parts().map(|sums| i64::from(sums[j])).sum::<i64>() as f64 / unit)
+        let mut all = [0_i64; 4];
+        for sums in sums {
+            for (all, x) in all.iter_mut().zip(sums) {
+                *all += i64::from(*x);
+            }
+        }
+        all.map(|sum| sum as f64 / unit)
     }
 }
 

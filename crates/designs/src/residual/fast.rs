@@ -4,24 +4,22 @@
 
 use fearless_simd::Simd;
 
-use crate::residual::choice::{Drawing, exchanges};
+use crate::residual::choice::Drawing;
 use crate::residual::errors::{
     Entry, Sums, Width, attenuated, centre, mass_of, of_pixel, share, shown,
 };
 use crate::residual::{ResidualSampler, Residue};
 use screendoor_rop::fast::{
     self, Count, FastSampler, Lanes, Loaded, Offered, Tally, below, in_sample_order, picked, ranks,
+    teeth,
 };
-use screendoor_rop::{PixelIndex, Probe, ReferenceKey, Round, Samples};
+use screendoor_rop::stochastic::comb::exchanges;
+use screendoor_rop::{Dither, PixelIndex, Probe, ReferenceKey, Round, Samples};
 use screendoor_trace::tile::{TILE_PIXELS, TileGrid, TileId};
 
 /// [`ResidualSampler`] with errors of one depth.
-pub(super) struct FastResidual<W: fast::Width, const N: usize> {
+pub(super) struct FastResidual<const N: usize> {
     plain: ResidualSampler<N>,
-    /// Each number's place in the comb, and by how much an exchange moves it.
-    places: [W::Row; 2],
-    /// How far the number's bit of [`exchanges`] lies from the upper one.
-    bits: W::Row,
 }
 
 /// What a pixel keeps beside its samples.
@@ -29,6 +27,8 @@ pub(super) struct FastResidual<W: fast::Width, const N: usize> {
 pub(super) struct Kept<R> {
     index: PixelIndex,
     fragments: u32,
+    /// What ξ of all fragments have in common where they are white.
+    white: u32,
     /// Whether anything was drawn: until then there is no entry.
     begun: bool,
     z: u32,
@@ -38,24 +38,28 @@ pub(super) struct Kept<R> {
     fixed: [R; 3],
 }
 
-impl<const N: usize> FastResidual<Count<N>, N>
-where
-    Count<N>: fast::Width,
-{
+/// What ξ is made of.
+#[inline(always)]
+fn key<R>(round: &Round, kept: &Kept<R>) -> ReferenceKey {
+    ReferenceKey { pixel: kept.index, surface: kept.fragments, seed: round.seed }
+}
+
+/// The sum of the lanes that `mask` names.
+#[inline(always)]
+fn over<S: Simd, L: Lanes<S>>(simd: S, row: L, mask: u64) -> i32 {
+    L::select(L::mask(simd, mask), row, L::splat(simd, 0)).sum()
+}
+
+impl<const N: usize> FastResidual<N> {
     /// The twin of `plain`, if it has one.
     pub(super) fn new(plain: ResidualSampler<N>) -> Option<Self> {
         let store = &plain.store;
         let simple = store.layers == 1 && store.parts == 1 && store.width == Width::Whole;
-        let row = |word: &dyn Fn(i32) -> i32| <Count<N> as fast::Width>::row(|n| word(n as i32));
-        (simple && plain.drawing == Drawing::Paired).then(|| FastResidual {
-            places: [row(&|n| n + 1), row(&|n| 1 - 2 * (n & 1))],
-            bits: row(&|n| 31 - n / 2),
-            plain,
-        })
+        (simple && plain.drawing == Drawing::Paired).then_some(FastResidual { plain })
     }
 }
 
-impl<const N: usize> FastSampler<N> for FastResidual<Count<N>, N>
+impl<const N: usize> FastSampler<N> for FastResidual<N>
 where
     Count<N>: fast::Width,
 {
@@ -66,6 +70,7 @@ where
         let cleared = |index| Kept {
             index,
             fragments: 0,
+            white: 0,
             begun: false,
             z: 0,
             mass: 0,
@@ -94,7 +99,16 @@ where
         }
     }
 
-    fn enter(&self, _: &Round, _: &mut [Self::State; TILE_PIXELS]) {}
+    fn enter(&self, round: &Round, states: &mut [Self::State; TILE_PIXELS]) {
+        for kept in states {
+            kept.white = Dither::white_in(round.seed, kept.index);
+        }
+    }
+
+    fn excess(&self, _: &ResidualSampler<N>, kept: &Self::State) -> [f64; 3] {
+        let [r, g, b, _] = self.plain.store.fractions([&kept.sums].into_iter());
+        [r, g, b]
+    }
 
     #[inline(always)]
     fn depth_bits(&self) -> u32 {
@@ -110,7 +124,7 @@ where
     fn choose<S: Simd, L: Lanes<S>, P: Probe>(
         &self,
         simd: S,
-        _: &Loaded<L>,
+        loaded: &Loaded<L>,
         kept: &mut Self::State,
         offered: Offered<'_, L>,
         tally: &mut Tally<'_, P>,
@@ -118,18 +132,15 @@ where
         let plain = &self.plain;
         let Offered { round, stored, words, passed, coverage, limit, fragment } = offered;
         let threshold = limit.threshold().value();
-        let key = ReferenceKey { pixel: kept.index, surface: kept.fragments, seed: round.seed };
-        let xi = plain.dither.in_round(*round, fragment.site(), &key, plain.reference);
+        let xi = match plain.dither {
+            Dither::White => Dither::white(kept.white, kept.fragments),
+            other => other.in_round(*round, fragment.site(), &key(round, kept), plain.reference),
+        };
         kept.fragments = kept.fragments.wrapping_add(1);
 
         // The samples' numbers pass or not, before it is known which sample has which.
-        let load = |row: &<Count<N> as fast::Width>::Row| L::load(simd, row.as_ref());
-        let step = L::splat(simd, threshold as u32 as i32);
-        let exchange = L::splat(simd, exchanges(xi) as i32);
-        let exchange = exchange.shift_left_by(load(&self.bits)).negative(simd);
-        let [place, move_by] = [load(&self.places[0]), load(&self.places[1])];
-        let place = L::select(exchange, place.add(move_by), place);
-        let hits = below(simd, place.mul(step).add(L::splat(simd, xi as i32)), limit);
+        let values = teeth(simd, loaded, xi, exchanges(xi), limit.threshold());
+        let hits = below(simd, values, limit);
         let ranks = match plain.sort {
             true => ranks(simd, stored, words, passed),
             false => in_sample_order(simd, passed),
@@ -141,15 +152,15 @@ where
         // What lies at the far plane counts as nothing, as it does everywhere.
         let writes = L::bits(written);
         let [met, left] = [passed & full, writes & full];
-        let zero = L::splat(simd, 0);
         let drawn = plain.fixed(fragment.colour());
-        let counts = [passed, writes].map(|mask| mask.count_ones() as i32);
-        let gone = [met, left].map(|mask| mask.count_ones() as i32);
+        let counts = [passed.count_ones() as i32, writes.count_ones() as i32];
+        let gone = [met.count_ones() as i32, left.count_ones() as i32];
         let mut changes = [[0; 2]; 4];
         for ((change, row), x) in changes.iter_mut().zip(&mut kept.fixed).zip(drawn) {
+            // No closures here: they would be compiled without the vectors' instructions.
             let held = L::load(simd, row.as_ref());
-            let sums = [met, left].map(|mask| L::select(L::mask(simd, mask), held, zero).sum());
-            *change = [counts[0] * x - sums[0], counts[1] * x - sums[1]];
+            let (all, some) = (over(simd, held, met), over(simd, held, left));
+            *change = [counts[0] * x - all, counts[1] * x - some];
             L::select(written, L::splat(simd, x), held).store(row.as_mut());
         }
         changes[3] = [(counts[0] - gone[0]) * drawn[3], (counts[1] - gone[1]) * drawn[3]];

@@ -18,8 +18,6 @@ use std::sync::Arc;
 
 use fearless_simd::Level;
 
-#[cfg(test)]
-use self::choice::comb;
 use self::choice::{Drawing, paired};
 #[cfg(test)]
 use self::errors::Flaw;
@@ -27,6 +25,8 @@ use self::errors::{Drawn, Entry, POINT, Store, Sums, Width};
 use self::fast::FastResidual;
 use screendoor_rop::fast::{self as fast_kit, Count, FastEngine};
 use screendoor_rop::shader;
+#[cfg(test)]
+use screendoor_rop::stochastic::comb;
 use screendoor_rop::tracked::{PIXEL_ORDER, REFERENCE, SORT};
 use screendoor_rop::view_depth::fraction;
 use screendoor_rop::{
@@ -227,7 +227,7 @@ impl<const N: usize> ResidualSampler<N> {
         for (n, s) in (0..).zip(&list) {
             let value = match self.drawing {
                 #[cfg(test)]
-                Drawing::Paired if self.has(Flaw::NoExchange) => comb(xi, n, threshold),
+                Drawing::Paired if self.has(Flaw::NoExchange) => comb::comb(xi, n, threshold),
                 Drawing::Paired => paired(xi, n, threshold),
                 Drawing::Hashed => self.reference.value(n, N as u32, key),
             };
@@ -391,7 +391,7 @@ impl<const N: usize> Sampler<N> for ResidualSampler<N> {
 
     fn fields(&self, p: &Residue) -> Vec<(&'static str, String)> {
         let words = |entry: &Entry| {
-            let [r, g, b, coverage] = self.store.of_whole_pixel(std::slice::from_ref(entry));
+            let [r, g, b, coverage] = self.store.fractions(entry.parts.iter());
             let (z, mass) = (depth(entry.z), f64::from(entry.mass) / f64::from(1 << 15));
             format!("z {z} rgb {r:+.4} {g:+.4} {b:+.4} coverage {coverage:+.4}, mass {mass:.3}")
         };

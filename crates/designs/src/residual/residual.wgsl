@@ -1,6 +1,6 @@
 // Twin of crates/designs/src/residual/mod.rs and errors.rs: samples less the error that chance
 // makes of them.
-// uses: dither opacity over_opaque pixel_order random replay resolve stochastic
+// uses: comb dither opacity over_opaque pixel_order random replay resolve stochastic
 
 const POINT: u32 = 20u;
 const MASS: u32 = 15u;
@@ -268,8 +268,7 @@ fn round_sums(xi: u32) {
 
 // choice::paired.
 fn paired(xi: u32, n: u32, threshold: Threshold) -> u32 {
-    let exchanged = n ^ ((xi >> ((n >> 1u) & 15u)) & 1u);
-    return xi + threshold.low * (exchanged + 1u);
+    return comb(xi, exchanged(n, exchanges(xi)), threshold);
 }
 
 // Sampler::choose.

@@ -1,6 +1,7 @@
 //! The results' part on all designs over the same fragments.
 
 use crate::document::{Section, Text, code};
+use crate::results::front;
 use crate::results::ratios::{OnScenes, below};
 use screendoor_study::study::comparison::{Comparison, Contender, Duel};
 use screendoor_study::study::publications::experiment::MeasuredScene;
@@ -16,7 +17,7 @@ pub(super) fn section(c: &Comparison) -> Section {
     let mut section = Section::new("All designs over the same fragments");
     preamble(&mut section, c);
     section.parts.extend(SHOWN.map(|count| table(c, count)));
-    section.parts.extend([methods(c), winners(c), duels(c)]);
+    section.parts.extend([methods(c), winners(c), front::section(c), duels(c)]);
     section
 }
 

@@ -5,6 +5,7 @@ use crate::results::plain;
 use crate::results::ratios::{Holding, holding};
 use screendoor_study::metrics::student_t;
 use screendoor_study::study::publications::{DESIGNS, MIXED, MeanError, Publications};
+use screendoor_study::study::record::Record;
 
 /// The section; nothing where no expectations were measured.
 pub(super) fn section(p: &Publications) -> Option<Section> {
@@ -51,7 +52,7 @@ pub(super) fn section(p: &Publications) -> Option<Section> {
             format!("`{}`", run.design),
             run.samples.to_string(),
             format!("{:+.4} ± {:.4}", mean.value, mean.half_width()),
-            if outside { format!("{:.1} σ", deviation(m)) } else { "within".to_string() },
+            if outside { format!("{:.1} σ", deviation(run)) } else { "within".to_string() },
             plain(run.covered.rmse),
             if run.kept().unbiased { "unbiased" } else { "biased" }.to_string(),
         ]
@@ -67,8 +68,15 @@ pub(super) fn section(p: &Publications) -> Option<Section> {
 }
 
 /// How far a mean error lies from 0, in standard errors.
-fn deviation(m: &MeanError) -> f64 {
-    m.run.covered.mean.standard_errors(m.run.seeds as usize)
+pub(super) fn deviation(run: &Record) -> f64 {
+    run.covered.mean.standard_errors(run.seeds as usize)
+}
+
+/// Whether a mean error is within what chance allows where so many are looked at together: 1 in
+/// 100 for all of them (Bonferroni).
+pub(super) fn within_chance(run: &Record, together: usize) -> bool {
+    let confidence = 1.0 - 0.01 / together.max(1) as f64;
+    deviation(run) <= student_t(confidence, run.seeds as usize)
 }
 
 /// Where mean errors are within what chance allows.
@@ -82,15 +90,14 @@ struct Found {
 impl Found {
     /// Of all mean errors, looked at together: 1 in 100 for the whole table.
     fn of(means: &[MeanError]) -> Self {
-        let confidence = 1.0 - 0.01 / means.len().max(1) as f64;
-        let within = |m: &MeanError| deviation(m) <= student_t(confidence, m.run.seeds as usize);
+        let within = |m: &MeanError| within_chance(&m.run, means.len());
         let on_scenes = |which: &dyn Fn(&MeanError) -> bool| {
             let chosen: Vec<&MeanError> = means.iter().filter(|m| which(m)).collect();
             let mut scenes: Vec<&str> = chosen.iter().map(|m| m.scene.as_str()).collect();
             scenes.sort_unstable();
             scenes.dedup();
             let all = |scene: &str| chosen.iter().filter(|m| m.scene == scene).all(|m| within(m));
-            let most = chosen.iter().map(|m| deviation(m)).fold(0.0, f64::max);
+            let most = chosen.iter().map(|m| deviation(&m.run)).fold(0.0, f64::max);
             (holding(scenes.into_iter().map(|scene| (scene, all(scene)))), most)
         };
         let (lk, lk_most) = on_scenes(&|m| m.run.design == DESIGNS[0]);

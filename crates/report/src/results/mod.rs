@@ -2,12 +2,14 @@
 //! it, and its entry in the list of its chapter.
 
 mod account;
+mod beyond;
 mod claims;
 mod comparison;
 mod dial;
 mod examples;
 mod expectations;
 mod figures;
+mod front;
 mod methods;
 mod noise;
 mod pixel_orders;
@@ -107,8 +109,10 @@ pub fn chapter(measured: &Reproduced) -> Chapter {
         Reproduced::Comparison(c) => {
             in_short = comparison::in_short(c);
             figures = dial::figures(&c.dial);
+            figures.extend(front::figures(c));
             vec![comparison::section(c), slab::section(c), dial::section(&c.dial)]
         }
+        Reproduced::Beyond(b) => vec![beyond::section(b)],
         Reproduced::Stability(s) => stability::sections(s),
     };
     Chapter { sections, in_short, figures }
@@ -141,8 +145,8 @@ const METHODS: [Of<Methods>; 8] = [
 ];
 
 /// The parts of RESULTS.md, each of which can be measured on its own.
-pub const PARTS: [Publication; 3] =
-    [Publication::LaineKarras, Publication::Methods, Publication::Comparison];
+pub const PARTS: [Publication; 4] =
+    [Publication::LaineKarras, Publication::Methods, Publication::Comparison, Publication::Beyond];
 
 /// Where its figures lie, as seen from RESULTS.md.
 pub const FIGURES_FOLDER: &str = "figures";

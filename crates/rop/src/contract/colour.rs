@@ -81,19 +81,36 @@ impl ColourStore {
     pub fn channel(self, value: f32) -> f32 {
         match self.width {
             ColourWidth::Unorm => (value.clamp(0.0, 1.0) * 255.0 + 0.5).floor() / 255.0,
-            ColourWidth::Half => {
-                let most = f16::MAX.to_f32();
-                f16::from_f32(value.clamp(-most, most)).to_f32()
-            }
+            ColourWidth::Half => as_half(value),
             ColourWidth::Single | ColourWidth::Trace => value,
         }
     }
 
     /// A colour as it is stored.
     #[inline]
-    pub fn colour(self, colour: [f32; 3]) -> [f32; 3] {
-        colour.map(|c| self.channel(c))
+    pub fn colour(self, [r, g, b]: [f32; 3]) -> [f32; 3] {
+        [self.channel(r), self.channel(g), self.channel(b)]
     }
+}
+
+/// The nearest number of 16-bit floating point, the even one of two; the greatest for what
+/// lies beyond.
+///
+/// `f16::from_f32` says the same (tests hold it to that) but asks the machine for its instructions
+/// with each number: it took a tenth of the time of designs that keep layers.
+#[inline]
+fn as_half(value: f32) -> f32 {
+    let value = value.clamp(f16::MIN.to_f32_const(), f16::MAX.to_f32_const());
+    if value.abs() >= f16::MIN_POSITIVE.to_f32_const() {
+        // Ten binary digits of 23 are kept.
+        let bits = value.to_bits();
+        return f32::from_bits((bits + 0xfff + (bits >> 13 & 1)) & !0x1fff);
+    }
+    if value.is_nan() {
+        return value;
+    }
+    // Subnormal ones are the multiples of 2^-24, as single precision has them from 1/2 to 1.
+    ((value.abs() + 0.75) - 0.75).copysign(value)
 }
 
 #[cfg(test)]
@@ -116,6 +133,13 @@ mod tests {
                 assert_eq!(HALF.channel(sign * middle.next_up()), sign * next);
             }
         }
+        let library = |value: f32| f16::from_f32(value).to_f32();
+        for value in (0..0x477f_e000).step_by(1021).map(f32::from_bits) {
+            for value in [value, -value] {
+                assert_eq!(HALF.channel(value).to_bits(), library(value).to_bits(), "{value}");
+            }
+        }
+        assert!(HALF.channel(f32::NAN).is_nan());
         assert_eq!(HALF.channel(1e9), 65504.0);
         assert_eq!(HALF.channel(f32::NEG_INFINITY), -65504.0);
     }

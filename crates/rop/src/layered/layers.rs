@@ -209,8 +209,8 @@ pub fn nearer<T: Deep, P: Probe>(list: &[T], depth: Unorm32, probe: &mut P) -> u
     let held = list.len() as u32;
     probe.compared(held);
     probe.state(DEPTH_BITS * held, 0);
-    // Lists are short, and most fragments are tested against all of one.
-    list.iter().take_while(|l| l.depth() < depth).count()
+    // All of it, short as it is: where to stop nobody can foretell.
+    list.iter().filter(|l| l.depth() < depth).count()
 }
 
 /// Puts `layer` of `bits` bits into a sorted list with room for `room`; the furthest

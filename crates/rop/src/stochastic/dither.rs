@@ -8,7 +8,7 @@ use crate::contract::words::{Ranks, TILE};
 use crate::stochastic::methods::Round;
 use crate::stochastic::pixel_order::PixelIndex;
 use crate::stochastic::reference_value::{Reference, ReferenceKey};
-use screendoor_trace::random::hash;
+use screendoor_trace::random::{hash, hash_on};
 
 screendoor_trace::options! {
     /// How ξ is spread over the pixels.
@@ -44,13 +44,25 @@ impl Dither {
         self != Dither::Sequence || reference.scrambles()
     }
 
+    /// What ξ of a pixel's surfaces have in common with [`Dither::White`].
+    #[inline(always)]
+    pub fn white_in(seed: u32, PixelIndex(pixel): PixelIndex) -> u32 {
+        hash([seed, pixel])
+    }
+
+    /// ξ of a surface with [`Dither::White`], of what its pixel's have in common.
+    #[inline(always)]
+    pub fn white(in_pixel: u32, surface: u32) -> u32 {
+        hash_on(in_pixel, [surface, FINE])
+    }
+
     /// ξ of a surface in a pixel, as a 32-bit fraction of 1: uniform over the seeds,
     /// and independent from surface to surface.
     pub fn value(self, site: Site, key: &ReferenceKey, reference: Reference) -> u32 {
         let Some(ranks) = self.ranks() else {
             return match self {
                 Dither::Sequence => reference.value(0, 1, key),
-                _ => hash([key.seed, key.pixel.0, key.surface, FINE]),
+                _ => Dither::white(Dither::white_in(key.seed, key.pixel), key.surface),
             };
         };
         let offset = hash([key.seed, key.surface, OFFSET]);

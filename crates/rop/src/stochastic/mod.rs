@@ -1,6 +1,7 @@
 //! The kit of the stochastic designs: which samples a fragment may write, and what becomes of
 //! them.
 
+pub mod comb;
 pub mod depth_bits;
 pub(crate) mod dither;
 pub mod fast;

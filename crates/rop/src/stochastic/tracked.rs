@@ -47,8 +47,10 @@ pub struct SampleOf<'a> {
     pub round: Round,
     /// The fragment's threshold.
     pub opacity: Threshold,
-    /// Whether it is the first sample of its fragment.
-    pub first: bool,
+    /// Which of its fragment's numbered samples it is, from 0.
+    pub place: u32,
+    /// How many samples of its fragment are numbered.
+    pub count: u32,
 }
 
 /// Reference values of figure 4: a hash for each sample.
@@ -211,21 +213,22 @@ impl<R: References, const N: usize> Sampler<N> for TrackedSampler<R, N> {
         let key =
             ReferenceKey { pixel: p.pixel_id, surface: p.surface.surface_id, seed: round.seed };
         let key = if self.prehash { key.prehashed() } else { key };
-        let mut of = SampleOf { site, key: &key, round, opacity, first: true };
+        let count = s.count();
+        let mut of = SampleOf { site, key: &key, round, opacity, place: 0, count };
         for sample in order {
             let index = usize::from(sample);
             let (reference, hashes) = self.references.value::<N>(&mut p.kept, n, &of);
-            of.first = false;
             probe.hashed(hashes);
             probe.reference(sample, n, reference, opacity);
             if opacity.passes(reference) && passed.contains(index) {
                 written.insert(index);
             }
             n += 1;
+            of.place += 1;
         }
 
         // 18: all that were numbered, written or not.
-        p.surface.hold(tracked, s.count());
+        p.surface.hold(tracked, count);
         let tracking = self.state_bits();
         probe.state(tracking, tracking);
         written

@@ -32,6 +32,7 @@ screendoor_trace::options! {
         Methods = "methods": "Enderton's examples, Wyman's probabilities, hashes, LK figure 8",
         Slab = "slab": "Wyman's claim: SLAB with 8 layers against 32 samples",
         Comparison = "comparison": "all designs at equal state, and Wyman's claim",
+        Beyond = "beyond": "no publication's: residual and merging beside LK, error and bias over many seeds",
         Stability = "stability": "no publication's: hard cases with known truth, and correlations",
     }
 }

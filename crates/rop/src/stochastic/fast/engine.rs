@@ -12,7 +12,7 @@ use crate::stochastic::fast::kernel;
 use crate::stochastic::fast::sampler::FastSampler;
 use crate::stochastic::fast::state::{FastTile, boxed};
 use crate::stochastic::fast::twin::FastEngine;
-use crate::stochastic::methods::{Pass, Round, Sampler};
+use crate::stochastic::methods::{Pass, Round};
 use screendoor_trace::picture::TilePixels;
 use screendoor_trace::tile::{TILE_PIXELS, TileGrid, TileId};
 use screendoor_trace::trace::{Block, Fragment};
@@ -156,9 +156,8 @@ where
                 let colours: [[f32; 3]; N] = std::array::from_fn(|s| {
                     std::array::from_fn(|c| f32::from_bits(colour[c].as_ref()[s] as u32))
                 });
-                let state = || self.sampler.to_plain(state.states[within]);
                 let plain = &self.plain.inner;
-                plain.mean(&colours, || plain.sampler.excess(&state()))
+                plain.mean(&colours, || self.sampler.excess(&plain.sampler, &state.states[within]))
             } else {
                 let pixel = state.plain(&self.sampler, within);
                 Design::resolve(&self.plain, site, &pixel)

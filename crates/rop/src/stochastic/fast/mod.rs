@@ -8,6 +8,7 @@
 //! range, very steep planes) and what is done once a pixel (the resolve of several
 //! passes) goes through it.
 
+mod comb;
 mod engine;
 mod kernel;
 mod limit;
@@ -22,6 +23,7 @@ mod tracked;
 mod twin;
 
 pub use crate::lanes::{Count, Lanes, Width, levels};
+pub use comb::teeth;
 pub use limit::{Limit, below};
 pub use rank::{in_sample_order, picked, ranks, ranks_of_any, ranks_of_distinct};
 pub use references::{Base, FastReferences, HashBy, Numbered, PublishedHash};

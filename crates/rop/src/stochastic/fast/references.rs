@@ -14,7 +14,7 @@ use crate::stochastic::tracked::{Hashed, References, SampleOf};
 /// The samples of a fragment that are to be numbered.
 #[derive(Clone, Copy, Debug)]
 pub struct Numbered<'a> {
-    /// What they have in common; [`SampleOf::first`] is set.
+    /// What they have in common: [`SampleOf::place`] is the first one's.
     pub of: SampleOf<'a>,
     /// The threshold once more.
     pub limit: Limit,

@@ -98,6 +98,10 @@ pub trait FastSampler<const N: usize>: Send + Sync + 'static {
     );
     /// Starts a round: works out what a pixel's fragments have in common in it.
     fn enter(&self, round: &Round, states: &mut [Self::State; TILE_PIXELS]);
+    /// As [`Sampler::excess`]; `plain` is the twin.
+    fn excess(&self, plain: &Self::Plain, state: &Self::State) -> [f64; 3] {
+        plain.excess(&self.to_plain(*state))
+    }
     /// Bits of a stored depth.
     fn depth_bits(&self) -> u32;
     /// Whether a fragment does nothing unless a sample of it passes the depth test.
@@ -123,4 +127,6 @@ pub struct Loaded<L> {
     pub reversed: L,
     /// Each lane's number.
     pub lanes: L,
+    /// How far the bit of each lane's pair lies from the upper one.
+    pub pairs: L,
 }

@@ -280,7 +280,7 @@ impl<R: Rules, F: FastReferences<N>, const N: usize> FastSampler<N> for FastTrac
             false => (key, p.base),
         };
         let (site, opacity) = (fragment.site(), limit.threshold());
-        let of = SampleOf { site, key: &key, round: *round, opacity, first: true };
+        let of = SampleOf { site, key: &key, round: *round, opacity, place: 0, count };
         let samples = Numbered { of, limit, base, starts, first, count };
         let hits = self.references.passing::<S, L, P>(simd, loaded, &mut kept, samples, tally);
 

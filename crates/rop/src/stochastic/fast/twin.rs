@@ -16,6 +16,7 @@ pub(super) struct Constants<W: Width> {
     offsets: [W::Row; 2],
     reversed: W::Row,
     lanes: W::Row,
+    pairs: W::Row,
 }
 
 impl<W: Width> Constants<W> {
@@ -26,6 +27,7 @@ impl<W: Width> Constants<W> {
             offsets: [offset(0), offset(1)],
             reversed: W::row(|n| (n as u32).reverse_bits() as i32),
             lanes: W::row(|n| n as i32),
+            pairs: W::row(|n| 31 - n as i32 / 2),
         }
     }
 
@@ -36,6 +38,7 @@ impl<W: Width> Constants<W> {
             offsets: [load(&self.offsets[0]), load(&self.offsets[1])],
             reversed: load(&self.reversed),
             lanes: load(&self.lanes),
+            pairs: load(&self.pairs),
         }
     }
 }

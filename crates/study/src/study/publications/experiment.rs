@@ -45,6 +45,7 @@ pub(in crate::study) mod studies {
         };
     }
 
+    pub(crate) const BEYOND: &str = study!("beyond");
     pub(crate) const COMPARISON: &str = study!("comparison");
     pub(crate) const SLAB: &str = study!("slab");
     pub(crate) const SLAB_RIVALS: &str = study!("slab-rivals");
@@ -314,6 +315,7 @@ mod tests {
     fn every_study_file_is_a_study() {
         use studies::*;
         let all = [
+            BEYOND,
             COMPARISON,
             SLAB,
             SLAB_RIVALS,

@@ -1,5 +1,6 @@
 //! The experiments of Laine and Karras 2011, on scenes that we have.
 
+pub mod beyond;
 pub mod claims;
 pub mod examples;
 pub mod experiment;

@@ -2,6 +2,7 @@
 
 use crate::study::comparison::{Comparison, compare, compare_slab};
 use crate::study::file::Publication;
+use crate::study::publications::beyond::{Beyond, beyond};
 use crate::study::publications::experiment::Lab;
 use crate::study::publications::methods::{Methods, methods};
 use crate::study::publications::{Effort, Publications, reproduce};
@@ -19,6 +20,8 @@ pub enum Reproduced {
     Slab(Box<Comparison>),
     /// [`Publication::Comparison`].
     Comparison(Box<Comparison>),
+    /// [`Publication::Beyond`].
+    Beyond(Box<Beyond>),
     /// [`Publication::Stability`].
     Stability(Box<Stability>),
 }
@@ -31,6 +34,7 @@ impl Reproduced {
             Reproduced::Methods(_) => Publication::Methods,
             Reproduced::Slab(_) => Publication::Slab,
             Reproduced::Comparison(_) => Publication::Comparison,
+            Reproduced::Beyond(_) => Publication::Beyond,
             Reproduced::Stability(_) => Publication::Stability,
         }
     }
@@ -41,6 +45,7 @@ impl Reproduced {
             Reproduced::LaineKarras(p) => &p.missing,
             Reproduced::Methods(_) | Reproduced::Stability(_) => &[],
             Reproduced::Slab(c) | Reproduced::Comparison(c) => &c.missing,
+            Reproduced::Beyond(b) => &b.missing,
         }
     }
 }
@@ -48,7 +53,7 @@ impl Reproduced {
 /// Measures a publication in a lab.
 ///
 /// # Errors
-/// As [`reproduce`], [`methods`], [`compare`] and [`stress_designs`].
+/// As [`reproduce`], [`methods`], [`compare`], [`beyond`] and [`stress_designs`].
 pub fn measure_publication(
     publication: Publication,
     lab: &Lab<'_>,
@@ -59,6 +64,7 @@ pub fn measure_publication(
         Publication::Methods => Reproduced::Methods(Box::new(methods(lab, effort)?)),
         Publication::Slab => Reproduced::Slab(Box::new(compare_slab(lab, effort)?)),
         Publication::Comparison => Reproduced::Comparison(Box::new(compare(lab, effort)?)),
+        Publication::Beyond => Reproduced::Beyond(Box::new(beyond(lab, effort)?)),
         Publication::Stability => {
             Reproduced::Stability(Box::new(stress_designs(16, |what, done, total| {
                 (lab.watch)(what, done, total);

@@ -1,4 +1,4 @@
-// Twin of crates/designs/src/merging.rs: layers with masks and depth planes; of one too many, the
+// Twin of crates/designs/src/merging/mod.rs and sheet.rs: layers with masks and depth planes; of one too many, the
 // two neighbours become one whose merging changes the picture least.
 // uses: colour frame over_opaque random replay
 

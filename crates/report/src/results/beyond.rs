@@ -1,0 +1,183 @@
+//! The results' part on this project's own designs, over many seeds.
+
+use crate::document::Section;
+use crate::results::expectations::{deviation, within_chance};
+use crate::results::ratios::{OnScenes, holding};
+use screendoor_study::metrics::Estimate;
+use screendoor_study::study::analysis::{RunName, ratio_on};
+use screendoor_study::study::publications::beyond::Beyond;
+use screendoor_study::study::record::Record;
+use screendoor_study::study::results::Results;
+
+/// The samples at which means and costs are shown.
+const SHOWN: u32 = 8;
+
+/// The part's only section.
+pub(super) fn section(b: &Beyond) -> Section {
+    let mut section = Section::new("Beyond LK: `residual` and `merging`");
+    let study = &b.results.study;
+    section.paragraph(format!(
+        "No publication's: what [`residual`](RESIDUAL.md) and [`merging`](MERGING.md) gain over `{}`, on \
+         every scene, {} × {} pixels, {} seeds. Errors are over the covered pixels, against the exact \
+         picture of the same samples.",
+        study.baseline, b.side, b.side, study.seeds
+    ));
+    for missing in &b.missing {
+        section.paragraph(format!("`{missing}` was not given and is left out."));
+    }
+    section.parts.extend(study.samples.iter().map(|n| ratios(&b.results, *n)));
+    section.parts.extend([means(&b.results), costs(&b.results)]);
+    section
+}
+
+/// Names of the study's scenes.
+fn scenes(results: &Results) -> impl Iterator<Item = &str> {
+    results.study.scenes.iter().map(|scene| scene.name.as_str())
+}
+
+/// Every design's error as a share of the baseline's at the same count.
+fn ratios(results: &Results, samples: u32) -> Section {
+    let study = &results.study;
+    let mut part =
+        Section::new(format!("RMSE as a share of `{}`'s, {samples} samples", study.baseline));
+    let to = RunName { series: &study.baseline, samples };
+    let own = |scene| results.record(scene, to.series, samples).map(|r| two(r.covered.rmse.value));
+    let first = ["`".to_string() + to.series + "`, RMSE", String::new()];
+    let first = first.into_iter().chain(scenes(results).map(|s| own(s).unwrap_or_default()));
+    let rest = study.designs.iter().filter(|series| **series != to.series).map(|series| {
+        let run = RunName { series, samples };
+        let each: Vec<Option<Estimate>> =
+            scenes(results).map(|scene| ratio_on(results, scene, run, to)).collect();
+        let known = scenes(results).map(String::from).zip(each.iter().copied());
+        let all = OnScenes(known.filter_map(|(scene, e)| Some((scene, e?))).collect());
+        let cells = each.iter().map(|e| e.map_or("—".to_string(), |e| share(e.value)));
+        [format!("`{series}`"), share(all.mean())].into_iter().chain(cells).collect::<Vec<_>>()
+    });
+    let rows = std::iter::once(first.collect::<Vec<_>>()).chain(rest);
+    part.table(["design", "all"].into_iter().chain(scenes(results)), rows);
+    part
+}
+
+/// A share in as many digits as say something.
+fn share(value: f64) -> String {
+    if value < 0.1 { format!("{value:.4}") } else { format!("{value:.3}") }
+}
+
+fn two(value: f64) -> String {
+    format!("{value:.2}")
+}
+
+/// Every mean error of the designs with its interval, and who is within what chance allows.
+fn means(results: &Results) -> Section {
+    let mut part = Section::new(format!("Mean error, {SHOWN} samples"));
+    let found = Found::of(&results.records);
+    part.paragraph(format!(
+        "Picture minus exact picture, mean over the covered pixels and the seeds, in 8-bit units, ± half \
+         of its 95 % interval. Of the {} mean errors of designs declared unbiased, at all sample counts, \
+         {} lie within their intervals, where 95 % are expected; looked at together (Bonferroni, 1 in \
+         100) they are within what chance allows {}, and the largest lies {:.1} standard errors from 0.",
+        found.unbiased, found.inside, found.scenes, found.most
+    ));
+    let row = |series: &String| {
+        let records: Vec<Option<&Record>> =
+            scenes(results).map(|scene| results.record(scene, series, SHOWN)).collect();
+        let declared = match records.iter().flatten().all(|r| r.kept().unbiased) {
+            true => "unbiased",
+            false => "biased",
+        };
+        let cells = records.iter().map(|r| r.map_or("—".to_string(), |r| mean(r.covered.mean)));
+        [format!("`{series}`"), declared.to_string()].into_iter().chain(cells).collect::<Vec<_>>()
+    };
+    let header = ["design", "declared"].into_iter().chain(scenes(results));
+    part.table(header, results.study.designs.iter().map(row));
+    part
+}
+
+fn mean(e: Estimate) -> String {
+    format!("{:+.3} ± {:.3}", e.value, e.half_width())
+}
+
+/// Where mean errors of what is declared unbiased lie.
+struct Found {
+    unbiased: usize,
+    inside: usize,
+    scenes: String,
+    most: f64,
+}
+
+impl Found {
+    fn of(records: &[Record]) -> Self {
+        let unbiased: Vec<&Record> = records.iter().filter(|r| r.kept().unbiased).collect();
+        let inside =
+            unbiased.iter().filter(|r| r.covered.mean.low <= 0.0 && r.covered.mean.high >= 0.0);
+        let mut scenes: Vec<&str> = unbiased.iter().map(|r| r.scene.as_str()).collect();
+        scenes.sort_unstable();
+        scenes.dedup();
+        let holds = |scene: &str| {
+            let mut own = unbiased.iter().filter(|r| r.scene == scene);
+            own.all(|r| within_chance(r, unbiased.len()))
+        };
+        Found {
+            unbiased: unbiased.len(),
+            inside: inside.count(),
+            scenes: holding(scenes.into_iter().map(|scene| (scene, holds(scene)))).words(),
+            most: unbiased.iter().map(|r| deviation(r)).fold(0.0, f64::max),
+        }
+    }
+}
+
+/// State and events of every design.
+fn costs(results: &Results) -> Section {
+    let mut part = Section::new(format!("State and events, {SHOWN} samples"));
+    part.paragraph(
+        "State per pixel as hardware holds it, and by layout in bits; per fragment, the mean over the \
+         scenes: hashes, comparators (depth tests, sorting networks, layers compared) and bytes of state \
+         read and written. Multiplications are no event: the designs' own pages count them. How fast the \
+         designs are replayed is in [PERFORMANCE.md](PERFORMANCE.md).",
+    );
+    let row = |series: &String| {
+        let records: Vec<&Record> =
+            scenes(results).filter_map(|scene| results.record(scene, series, SHOWN)).collect();
+        let mean = |of: &dyn Fn(&Record) -> Option<f64>| {
+            let all: Option<Vec<f64>> = records.iter().map(|r| of(r)).collect();
+            let all = all.filter(|all| !all.is_empty());
+            all.map_or("—".to_string(), |all| two(all.iter().sum::<f64>() / all.len() as f64))
+        };
+        let bytes = records.first().and_then(|r| r.state_bytes());
+        vec![
+            format!("`{series}`"),
+            bytes.map_or("grows".to_string(), |bytes| format!("{bytes:.0}")),
+            records.first().map_or(String::new(), |r| r.layout.clone()),
+            mean(&Record::hashes_per_fragment),
+            mean(&Record::comparators_per_fragment),
+            mean(&Record::bytes_moved_per_fragment),
+        ]
+    };
+    let header = ["design", "bytes", "layout", "hashes", "comparators", "bytes moved"];
+    part.table(header, results.study.designs.iter().map(row));
+    part
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use screendoor_study::study::analysis::made_up;
+    use screendoor_study::study::record::Promise;
+
+    fn record(scene: &str, mean: f64) -> Record {
+        let mut record = made_up::record(scene, "residual", 8, made_up::exactly(1.0));
+        record.covered.mean = Estimate { value: mean, low: mean - 0.1, high: mean + 0.1 };
+        record.seeds = 64;
+        record.promises.unbiased = Promise::Always;
+        record
+    }
+
+    #[test]
+    fn a_bias_of_what_is_declared_unbiased_is_told() {
+        let found = Found::of(&[record("a", 0.05), record("b", -0.02)]);
+        assert_eq!((found.unbiased, found.inside), (2, 2));
+        assert_eq!(found.scenes, "on all 2 scenes");
+        let planted = Found::of(&[record("a", 0.05), record("b", 0.4)]);
+        assert_eq!((planted.inside, planted.scenes.as_str()), (1, "on 1 of 2 scenes (not on `b`)"));
+    }
+}
