@@ -9,8 +9,8 @@
 //! At an α near 1/2 every other sample passes; the next surface, whose samples come in the
 //! order of what those left, takes every other of them again: the same of two patterns
 //! over and over, which aliases where there are enough samples for it. So within a fragment the
-//! two samples of each pair exchange their places in the row at random (`exchange`), by bits that
-//! are made of the phase at which it starts. Elsewhere that only blurs what the row keeps even.
+//! two samples of each pair exchange their places in the row at random (`exchange`). Elsewhere
+//! that only blurs what the row keeps even.
 
 use fearless_simd::{Level, Simd};
 
@@ -19,7 +19,7 @@ use screendoor_rop::fast::{
     Parameterised, Published, Tally, Width, below, is_published, teeth,
 };
 use screendoor_rop::shader;
-use screendoor_rop::stochastic::comb::{among, comb, exchanged, exchanges};
+use screendoor_rop::stochastic::comb::{among, comb, exchanged};
 use screendoor_rop::stochastic::{self, COMBINATIONS, METHOD, OPAQUE, ROUNDS, STRATA};
 use screendoor_rop::tracked::{
     COMPACT, PIXEL_ORDER, PREHASH, REFERENCE, References, SORT, SURFACES, SampleOf, TRACK,
@@ -32,6 +32,7 @@ use screendoor_rop::{
 };
 use screendoor_trace::error::Result;
 use screendoor_trace::param::{Typed, Values};
+use screendoor_trace::random::hash;
 
 screendoor_trace::options! {
     /// What the place of a sample in its surface is counted in.
@@ -184,12 +185,15 @@ impl Evenly {
             reference: values.get(REFERENCE),
         }
     }
+}
 
-    /// Which of a fragment's pairs exchange their places, by the phase at which it starts.
-    #[inline(always)]
-    fn exchanges<const N: usize>(&self, start: u32, threshold: Threshold, count: u32) -> u32 {
-        if self.exchange.holds(threshold, N) { among(exchanges(start), count) } else { 0 }
-    }
+/// Keeps the words for pairs apart from others that a surface might be hashed with.
+const PAIRS: u32 = 0x0bad_cab5;
+
+/// Which of a fragment's `count` pairs exchange their places. One hash, which has nothing to do
+/// with ξ: so a sample's probability stays alpha.
+fn pairs(round: &Round, key: &ReferenceKey, count: u32) -> u32 {
+    among(hash([key.seed, key.pixel.0, key.surface, round.index, PAIRS]), count)
 }
 
 impl References for Evenly {
@@ -218,8 +222,11 @@ impl References for Evenly {
             Phase::Count => (before.wrapping_add(threshold.wrapping_mul(n - of.place)), before),
         };
         *kept = Some(after);
-        let place = exchanged(of.place, self.exchanges::<N>(start, of.opacity, of.count));
-        (comb(start, place, of.opacity), hashes)
+        if !self.exchange.holds(of.opacity, N) {
+            return (comb(start, of.place, of.opacity), hashes);
+        }
+        let place = exchanged(of.place, pairs(&of.round, of.key, of.count));
+        (comb(start, place, of.opacity), hashes + u32::from(of.place == 0))
     }
 
     fn kept_bits(&self) -> u32 {
@@ -286,9 +293,24 @@ impl<const N: usize> FastReferences<N> for Evenly {
         };
         let end = start.wrapping_add(threshold.wrapping_mul(count));
         *kept = Some(if self.phase == Phase::Sum { end } else { xi });
-        let exchanges = self.exchanges::<N>(start, of.opacity, count);
+        let exchanges = exchanges::<N, _>(self.exchange, &samples, tally);
         evenly(simd, loaded, (start, exchanges), limit)
     }
+}
+
+/// [`pairs`] of a fragment, where its pairs exchange their places.
+#[inline(always)]
+fn exchanges<const N: usize, P: Probe>(
+    exchange: Exchange,
+    samples: &Numbered<'_>,
+    tally: &mut Tally<'_, P>,
+) -> u32 {
+    let Numbered { of, limit, count, .. } = samples;
+    if !exchange.holds(limit.threshold(), N) {
+        return 0;
+    }
+    tally.hashed(u32::from(*count > 0));
+    pairs(&of.round, of.key, *count)
 }
 
 /// Which of a run of samples pass whose phases follow a start in even steps, pairs exchanged.
@@ -345,8 +367,7 @@ impl<const N: usize> FastReferences<N> for Summed {
             (false, false) => first(base),
         };
         *kept = (start.wrapping_add(threshold.wrapping_mul(count)), begun || count > 0);
-        let exchange = Exchange::Half.holds(limit.threshold(), N);
-        let exchanges = if exchange { among(exchanges(start), count) } else { 0 };
+        let exchanges = exchanges::<N, _>(Exchange::Half, &samples, tally);
         evenly(simd, loaded, (start, exchanges), limit)
     }
 }

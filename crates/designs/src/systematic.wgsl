@@ -1,5 +1,5 @@
 // Twin of crates/designs/src/systematic.rs: evenly spaced reference values.
-// uses: comb dither over_opaque replay resolve stochastic tracked
+// uses: comb dither over_opaque random replay resolve stochastic tracked
 
 // The last phase of the surface, and whether it has one. Where places are counted, ξ.
 var<private> phase: u32;
@@ -57,7 +57,11 @@ fn references_begin(round: Round, key: ReferenceKey, opacity: Threshold, number:
         let xi = dither_in_round(site.x, site.y, key, round.index, round.count_log2);
         start = xi + opacity.low * number;
     }
-    pairs = select(0u, among(exchanges(start), count), exchanges_pairs(opacity));
+    pairs = 0u;
+    if exchanges_pairs(opacity) {
+        let word = hash_on(hash4(key.seed, key.pixel, key.surface, round.index), 0x0badcab5u);
+        pairs = among(word, count);
+    }
 }
 
 fn reference_of(round: Round, key: ReferenceKey, opacity: Threshold, number: u32, place: u32) -> u32 {

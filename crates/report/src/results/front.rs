@@ -38,41 +38,40 @@ impl Point<'_> {
 }
 
 /// All that read the trace once, whatever its order, and whose state does not grow.
-fn points(c: &Comparison) -> Vec<Point<'_>> {
-    let Some(baseline) = c.contender(BASELINE.0) else { return Vec::new() };
-    let rmse = |r: &Record| r.covered.rmse.value.max(ROUNDING);
-    let point = |contender: &'_ Contender, samples: u32| {
-        let each = c.scenes.iter().map(|s| s.record(&contender.series, samples));
-        let records: Vec<&Record> = each.collect::<Option<_>>()?;
-        let bytes: Vec<f64> = records.iter().map(|r| r.state_bytes()).collect::<Option<_>>()?;
-        if records.iter().any(|r| r.passes != 1) || contender.sorted_by_application {
+fn points<'a>(contenders: &'a [Contender], scenes: &'a [MeasuredScene]) -> Vec<Point<'a>> {
+    let baseline = contenders.iter().find(|c| c.label == BASELINE.0);
+    let to = |scene: &MeasuredScene| scene.record(&baseline?.series, BASELINE.1).map(rmse);
+    let Some(to) = scenes.iter().map(to).collect::<Option<Vec<f64>>>() else { return Vec::new() };
+    let point = |contender: &'a Contender, samples: u32| {
+        let each = scenes.iter().map(|scene| scene.record(&contender.series, samples));
+        let records = each.collect::<Option<Vec<&Record>>>()?;
+        if contender.sorted_by_application || records.iter().any(|r| r.passes != 1) {
             return None;
         }
-        let ratio = |(s, r): (&MeasuredScene, &&Record)| {
-            let to = s.record(&baseline.series, BASELINE.1)?;
-            let value = rmse(r) / rmse(to);
-            Some((s.name.clone(), Estimate { value, low: value, high: value }))
-        };
-        let ratios: Option<Vec<_>> = c.scenes.iter().zip(&records).map(ratio).collect();
-        Some((records, bytes.into_iter().fold(0.0, f64::max), OnScenes(ratios?).mean()))
+        let bytes = records.iter().map(|r| r.state_bytes()).collect::<Option<Vec<f64>>>()?;
+        let ratios = records.iter().zip(&to).map(|(r, to)| rmse(r) / to).map(without_interval);
+        let named = scenes.iter().map(|scene| scene.name.clone());
+        Some(Point {
+            contender,
+            family: records.first()?.family.as_str(),
+            samples,
+            bytes: bytes.into_iter().fold(0.0, f64::max),
+            error: OnScenes(named.zip(ratios).collect()).mean(),
+            unbiased: records.iter().all(|r| r.kept().unbiased),
+            own: contender.label.split(':').next().is_some_and(|name| OWN.contains(&name)),
+        })
     };
-    let mut list = Vec::new();
-    for contender in &c.contenders {
-        for samples in COUNTS {
-            let Some((records, bytes, error)) = point(contender, samples) else { continue };
-            let name = contender.label.split(':').next().unwrap_or_default();
-            list.push(Point {
-                contender,
-                family: records.first().map_or("", |r| r.family.as_str()),
-                samples,
-                bytes,
-                error,
-                unbiased: records.iter().all(|r| r.kept().unbiased),
-                own: OWN.contains(&name),
-            });
-        }
-    }
-    list
+    let runs = contenders.iter().flat_map(|c| COUNTS.map(|samples| (c, samples)));
+    runs.filter_map(|(contender, samples)| point(contender, samples)).collect()
+}
+
+/// An RMSE that a mean of ratios can be made of.
+fn rmse(record: &Record) -> f64 {
+    record.covered.rmse.value.max(ROUNDING)
+}
+
+fn without_interval(value: f64) -> Estimate {
+    Estimate { value, low: value, high: value }
 }
 
 /// Those that nothing among them has less of one of and no more of the other.
@@ -94,7 +93,7 @@ fn within<'p, 'a>(front: &[&'p Point<'a>], bytes: f64) -> Option<&'p Point<'a>> 
 /// The section; nothing of it where the baseline lacks.
 pub(super) fn section(c: &Comparison) -> Section {
     let mut part = Section::new("The Pareto front of one pass in any order");
-    let points = points(c);
+    let points = points(&c.contenders, &c.scenes);
     part.paragraph(format!(
         "Designs that read the trace once, in any order of fragments, with a state that does not grow: \
          the least error within so many bytes per pixel, without {} and with them. Errors are the \
@@ -135,7 +134,7 @@ pub(super) fn section(c: &Comparison) -> Section {
 
 /// The chart; none without results.
 pub(super) fn figures(c: &Comparison) -> Vec<(&'static str, Drawn)> {
-    let points = points(c);
+    let points = points(&c.contenders, &c.scenes);
     let fronts = [best(points.iter().filter(|p| !p.own)), best(points.iter())];
     let is_shown = |p: &Point<'_>| fronts.iter().flatten().any(|on| on.contender == p.contender);
     let shown: Vec<&Contender> = {
@@ -163,7 +162,7 @@ pub(super) fn figures(c: &Comparison) -> Vec<(&'static str, Drawn)> {
                 id: None,
                 samples: Some(p.samples),
                 cost: Spread { low: p.bytes, median: p.bytes, high: p.bytes },
-                error: Estimate { value: p.error, low: p.error, high: p.error },
+                error: without_interval(p.error),
                 says: format!(
                     "{} at {}\n{:.0} bytes, {:.3}",
                     contender.label, p.samples, p.bytes, p.error
@@ -187,4 +186,40 @@ pub(super) fn figures(c: &Comparison) -> Vec<(&'static str, Drawn)> {
         line: Some(1.0),
     };
     plot.draw().map(|chart| (CHART, Drawn::Chart(alone(&chart)))).into_iter().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use screendoor_study::study::analysis::made_up;
+
+    #[test]
+    fn a_front_has_who_is_best_for_its_size_and_changes_with_what_is_new() {
+        let contender = |label: &str| Contender {
+            label: label.to_string(),
+            series: label.to_string(),
+            sorted_by_application: label == "sorted-blend",
+        };
+        let names = ["lk", "mlab", "merging", "mboit", "sorted-blend"];
+        let contenders = names.map(contender);
+        // Errors at 8 samples; at 4 twice as much.
+        let errors = [8.0, 4.0, 1.0, 0.5, 0.5];
+        let record = |(name, error): (&&str, &f64), samples: u32| {
+            let error = error * 8.0 / f64::from(samples);
+            let mut record = made_up::record("a", name, samples, made_up::exactly(error));
+            (record.state_bits.samples, record.state_bits.extra) = (64 * samples, 0);
+            record.state_bits.unbounded = false;
+            record.passes = if *name == "mboit" { 2 } else { 1 };
+            record
+        };
+        let counts = |pair| [4, 8].map(|samples| record(pair, samples));
+        let records = names.iter().zip(&errors).flat_map(counts).collect();
+        let scenes = [made_up::scene("a", records)];
+        let points = points(&contenders, &scenes);
+        let said = |list: Vec<&Point<'_>>| list.iter().map(|p| p.says()).collect::<Vec<_>>();
+        assert_eq!(points.len(), 6);
+        let before = best(points.iter().filter(|p| !p.own));
+        assert_eq!(said(before), ["`mlab` 4: 1.000", "`mlab` 8: 0.500"]);
+        assert_eq!(said(best(points.iter())), ["`merging` 4: 0.250", "`merging` 8: 0.125"]);
+    }
 }

@@ -112,7 +112,10 @@ pub fn chapter(measured: &Reproduced) -> Chapter {
             figures.extend(front::figures(c));
             vec![comparison::section(c), slab::section(c), dial::section(&c.dial)]
         }
-        Reproduced::Beyond(b) => vec![beyond::section(b)],
+        Reproduced::Beyond(b) => {
+            in_short = beyond::in_short(b);
+            vec![beyond::section(b)]
+        }
         Reproduced::Stability(s) => stability::sections(s),
     };
     Chapter { sections, in_short, figures }
