@@ -262,7 +262,7 @@ impl Configured {
     ///
     /// # Errors
     /// As [`Frame::of`] and [`Trace::batch`]; [`Error::Config`] where it takes more.
-    pub fn frame_within(
+    pub(crate) fn frame_within(
         &self,
         trace: &Trace,
         samples: u32,

@@ -127,12 +127,12 @@ impl Gpu {
     }
 
     /// Whether it can tell when its programs begin and end.
-    pub fn has_timestamps(&self) -> bool {
+    pub(crate) fn has_timestamps(&self) -> bool {
         self.device.features().contains(wgpu::Features::TIMESTAMP_QUERY)
     }
 
     /// Whether threads that run in step can look at each other's values.
-    pub fn has_subgroups(&self) -> bool {
+    pub(crate) fn has_subgroups(&self) -> bool {
         self.device.features().contains(wgpu::Features::SUBGROUP)
     }
 

@@ -12,7 +12,6 @@ mod results;
 mod stability;
 
 pub use folder::{About, PAGE, write_report};
-pub use montage::{Panel, montage};
 pub use results::{
     Chapter, FIGURES, FIGURES_FOLDER, Figure, PARTS, chapter, check_marks, in_short, results,
 };

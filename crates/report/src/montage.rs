@@ -5,7 +5,7 @@ use screendoor_trace::tile::TileGrid;
 
 /// A picture's part in a montage.
 #[derive(Clone, Copy, Debug)]
-pub struct Panel<'a> {
+pub(crate) struct Panel<'a> {
     /// The picture.
     pub picture: &'a Picture,
     /// A rectangle of it: left, top, width, height; all of it where not given.
@@ -21,7 +21,7 @@ const GAP: u32 = 8;
 ///
 /// # Panics
 /// Where there are no panels.
-pub fn montage(panels: &[Panel<'_>], columns: u32) -> Picture {
+pub(crate) fn montage(panels: &[Panel<'_>], columns: u32) -> Picture {
     let frames: Vec<[u32; 4]> = panels
         .iter()
         .map(|p| p.crop.unwrap_or([0, 0, p.picture.width(), p.picture.height()]))

@@ -13,7 +13,8 @@ pub use alone::alone;
 pub use plot::{Axis, Curve, Mark, Names, Plot};
 pub use rows::{Bar, Row, Rows, Segment};
 pub use scale::{Kind, Scale, Tick};
-pub use style::{Style, Styles, key, swatch};
+pub(crate) use style::swatch;
+pub use style::{Style, Styles, key};
 
 /// A position in a chart, to a twentieth of a unit: no screen shows more.
 fn px(v: f64) -> String {

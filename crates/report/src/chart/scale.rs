@@ -87,7 +87,7 @@ impl Scale {
     }
 
     /// The ticks, small values first.
-    pub fn ticks(&self) -> Vec<Tick> {
+    pub(crate) fn ticks(&self) -> Vec<Tick> {
         let [low, high] = self.domain;
         match self.kind {
             Kind::Linear => {

@@ -83,7 +83,7 @@ pub(super) const QUANTITIES: [(&str, &str); 3] =
     [("a", MARKERS[0]), ("b", MARKERS[1]), ("c", MARKERS[3])];
 
 /// The mark of a quantity beside text.
-pub fn swatch(class: &str) -> Markup {
+pub(crate) fn swatch(class: &str) -> Markup {
     let marker = QUANTITIES.iter().find(|(c, _)| *c == class).map_or(MARKERS[1], |(_, m)| m);
     html! {
         svg class="key" viewBox="-7 -7 14 14" width="11" height="11" aria-hidden="true" {

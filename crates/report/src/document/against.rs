@@ -58,7 +58,7 @@ impl Agreement {
 
 impl Against {
     /// What is printed, what is measured, the verdict: a paragraph each.
-    pub fn paragraphs(&self) -> [Text; 3] {
+    pub(crate) fn paragraphs(&self) -> [Text; 3] {
         let Against { source, printed, measured, remark, .. } = self;
         let verdict = self.agreement.word();
         [

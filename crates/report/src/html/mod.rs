@@ -22,5 +22,5 @@ pub(crate) mod words;
 pub use choice::answer;
 pub use document::Figure;
 pub use page::{DesignText, Extras, Place, Section, page};
-pub use parts::replay_command;
+pub(crate) use parts::replay_command;
 pub use words::grouped;

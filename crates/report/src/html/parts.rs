@@ -86,7 +86,7 @@ impl<'a> Content<'a> {
 
 /// The command that replays a run with its first `seeds` seeds and holds it against the
 /// exact picture. Traces are named as seen from the results' folder.
-pub fn replay_command(results: &Results, record: &Record, seeds: u32) -> String {
+pub(crate) fn replay_command(results: &Results, record: &Record, seeds: u32) -> String {
     let trace = results.scenes.iter().find(|s| s.name == record.scene);
     let trace = trace.map_or("TRACE", |s| s.trace.as_str());
     let first = match results.study.first_seed {

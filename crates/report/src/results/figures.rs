@@ -1,8 +1,8 @@
 //! The document's pictures.
 
 use crate::document::Section;
+use crate::montage::{Panel, montage};
 use crate::results::Drawn;
-use crate::{Panel, montage};
 use screendoor_study::study::publications::{NamedPicture, Publications};
 use screendoor_trace::picture::Picture;
 

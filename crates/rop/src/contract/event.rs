@@ -432,7 +432,7 @@ pub struct ReferenceRecord {
 
 impl Record {
     /// Whether nothing was done: a pass that does not look at the fragment.
-    pub fn is_idle(&self) -> bool {
+    pub(crate) fn is_idle(&self) -> bool {
         self.samples_tested == 0
             && self.written.is_empty()
             && self.hashes == 0

@@ -20,7 +20,7 @@ screendoor_trace::options! {
 
 impl Normalise {
     /// Whether total alpha is needed.
-    pub fn by_alpha(self) -> bool {
+    pub(crate) fn by_alpha(self) -> bool {
         matches!(self, Normalise::Alpha | Normalise::Both)
     }
 

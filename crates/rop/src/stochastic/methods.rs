@@ -43,7 +43,7 @@ impl Method {
     }
 
     /// Whether samples hold depths alone, and colours are added up in a pass of their own.
-    pub fn depth_based(self) -> bool {
+    pub(crate) fn depth_based(self) -> bool {
         matches!(self, Method::Depth | Method::DepthCorrection)
     }
 }

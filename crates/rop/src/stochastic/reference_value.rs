@@ -62,7 +62,7 @@ impl Reference {
 
     /// How many of figure 4's multiply-XOR rounds a value passes through; `None` for
     /// other hashes.
-    pub fn lk2011_rounds(self) -> Option<usize> {
+    pub(crate) fn lk2011_rounds(self) -> Option<usize> {
         match self {
             Reference::Lk2011Rounds1 => Some(1),
             Reference::Lk2011Rounds2 => Some(2),

@@ -34,7 +34,7 @@ use screendoor_trace::picture::{Picture, srgb};
 use screendoor_trace::tile::TILE_PIXELS;
 
 /// What one unit of an error is of the range from black to white.
-pub const UNIT: f64 = 1.0 / 255.0;
+pub(crate) const UNIT: f64 = 1.0 / 255.0;
 
 /// An error of this size, in 8-bit units, is one of rounding: of sums in single precision, or of
 /// what is kept in 2^-20ths. Beyond it a mean error may be told from chance.

@@ -39,7 +39,7 @@ screendoor_trace::options! {
 
 impl Publication {
     /// Whether another one measures all of this one's figures too.
-    pub fn is_part_of(self, other: Publication) -> bool {
+    pub(crate) fn is_part_of(self, other: Publication) -> bool {
         self == Publication::Slab && other == Publication::Comparison
     }
 }

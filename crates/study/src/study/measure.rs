@@ -25,7 +25,7 @@ use screendoor_trace::picture::Picture;
 use screendoor_trace::trace::Trace;
 
 /// Standard deviations of the Gaussians that stand for a viewer further away, in pixels.
-pub const SIGMAS: [f64; 2] = [1.0, 2.0];
+pub(crate) const SIGMAS: [f64; 2] = [1.0, 2.0];
 
 /// One seed's replay.
 #[derive(Debug)]

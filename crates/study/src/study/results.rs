@@ -55,7 +55,7 @@ pub struct SceneFacts {
 impl SceneFacts {
     /// Whether a trace with this content and view is the one that was measured. What was
     /// measured before traces had views had none that it could depend on.
-    pub fn are_of(&self, content: &str, view: Option<&View>) -> bool {
+    pub(crate) fn are_of(&self, content: &str, view: Option<&View>) -> bool {
         let views = self.view.as_ref().zip(view);
         self.content == content && views.is_none_or(|(measured, found)| measured == found)
     }

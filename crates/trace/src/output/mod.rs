@@ -138,7 +138,7 @@ impl OutputFile {
 
     /// The file where what was written can be gone back to and written over: not one that is
     /// written directly.
-    pub fn seekable(&mut self) -> Option<impl Write + Seek> {
+    pub(crate) fn seekable(&mut self) -> Option<impl Write + Seek> {
         match &mut self.target {
             Target::Beside { file, .. } => Some(file),
             Target::Direct(_) => None,

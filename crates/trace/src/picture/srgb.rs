@@ -17,7 +17,7 @@ pub fn encode(linear: f64) -> f64 {
 }
 
 /// The sRGB encoding in 8 bits, rounded to nearest.
-pub fn encode8(linear: f64) -> u8 {
+pub(crate) fn encode8(linear: f64) -> u8 {
     (encode(linear) * 255.0 + 0.5) as u8
 }
 

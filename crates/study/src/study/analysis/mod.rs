@@ -21,7 +21,4 @@ pub use convergence::convergence;
 pub use cost::Cost;
 pub use front::{Point, Points, front, points};
 pub use kept::kept;
-pub use relative::{
-    ROUNDING, RunName, baseline, has_interval, ratio, ratio_on, records_over_scenes,
-    reference_count, relative, relative_on,
-};
+pub use relative::{ROUNDING, RunName, baseline, ratio, ratio_on, reference_count, relative};

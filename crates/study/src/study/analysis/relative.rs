@@ -38,7 +38,7 @@ pub fn baseline(study: &Study) -> RunName<'_> {
 ///
 /// # Errors
 /// The scenes without a record.
-pub fn records_over_scenes<'a>(
+pub(crate) fn records_over_scenes<'a>(
     results: &'a Results,
     run: RunName<'_>,
 ) -> Result<Vec<&'a Record>, Vec<String>> {
@@ -97,14 +97,9 @@ pub fn relative(results: &Results, run: RunName<'_>) -> Result<Estimate, Vec<Str
     ratio(results, run, baseline(&results.study))
 }
 
-/// [`ratio_on`] to the baseline.
-pub fn relative_on(results: &Results, scene: &str, run: RunName<'_>) -> Option<Estimate> {
-    ratio_on(results, scene, run, baseline(&results.study))
-}
-
 /// Whether the intervals of a run's errors say anything: those of a single seed do not,
 /// where others would give another picture.
-pub fn has_interval(results: &Results, run: RunName<'_>) -> bool {
+pub(crate) fn has_interval(results: &Results, run: RunName<'_>) -> bool {
     records_over_scenes(results, run)
         .is_ok_and(|records| records.iter().all(|r| r.seeds > 1 || !r.promises.seeded))
 }
@@ -164,7 +159,10 @@ mod tests {
         let half = (2.0 * each * each).sqrt() / 2.0;
         assert!((overall.high.ln() - half).abs() < 1e-12, "{overall:?}");
         assert!((overall.low.ln() + half).abs() < 1e-12);
-        assert_eq!(relative_on(&results, "s", run("b", 8)).unwrap().value, 0.5);
+        assert_eq!(
+            ratio_on(&results, "s", run("b", 8), baseline(&results.study)).unwrap().value,
+            0.5
+        );
         assert_eq!(relative(&results, run("a", 8)).unwrap(), exactly(1.0));
     }
 
@@ -174,7 +172,7 @@ mod tests {
         let mut results = planted(&["s", "t"], &[8], &[("a", two), ("b", two)]);
         results.records.retain(|r| (r.series.as_str(), r.scene.as_str()) != ("b", "t"));
         assert_eq!(relative(&results, run("b", 8)), Err(vec!["t".to_string()]));
-        assert_eq!(relative_on(&results, "t", run("b", 8)), None);
+        assert_eq!(ratio_on(&results, "t", run("b", 8), baseline(&results.study)), None);
         // Without the baseline nothing is relative to it.
         results.records.retain(|r| (r.series.as_str(), r.scene.as_str()) != ("a", "s"));
         let both = vec!["s".to_string(), "t".to_string()];

@@ -68,7 +68,7 @@ pub fn compare(lab: &Lab<'_>, effort: Effort) -> Result<Comparison> {
 ///
 /// # Errors
 /// As [`compare`].
-pub fn compare_slab(lab: &Lab<'_>, effort: Effort) -> Result<Comparison> {
+pub(crate) fn compare_slab(lab: &Lab<'_>, effort: Effort) -> Result<Comparison> {
     compare_some(lab, effort, &slab()?)
 }
 

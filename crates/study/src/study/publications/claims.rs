@@ -97,7 +97,7 @@ pub fn dialled(bits: u32) -> String {
 
 impl Effort {
     /// Frame side in pixels of the claims, which all scenes are tried for.
-    pub fn claims_side(&self) -> u32 {
+    pub(crate) fn claims_side(&self) -> u32 {
         (self.comparison_side / 2).max(16)
     }
 }

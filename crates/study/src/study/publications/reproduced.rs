@@ -53,7 +53,7 @@ impl Reproduced {
 /// Measures a publication in a lab.
 ///
 /// # Errors
-/// As [`reproduce`], [`methods`], [`compare`], [`beyond`] and [`stress_designs`].
+/// As [`reproduce`], [`methods`], [`compare`] and [`beyond`], and where a hard case cannot be made.
 pub fn measure_publication(
     publication: Publication,
     lab: &Lab<'_>,

@@ -138,12 +138,12 @@ impl Store {
     }
 
     /// A scene's facts.
-    pub fn scene_file(&self, scene: usize) -> PathBuf {
+    pub(crate) fn scene_file(&self, scene: usize) -> PathBuf {
         self.folder.join("scenes").join(format!("{}.json", self.study.scenes[scene].name))
     }
 
     /// A drawn scene's trace, as seen from the folder.
-    pub fn trace_name(&self, scene: usize) -> String {
+    pub(crate) fn trace_name(&self, scene: usize) -> String {
         format!("traces/{}.arrow", self.study.scenes[scene].name)
     }
 
@@ -153,7 +153,7 @@ impl Store {
     }
 
     /// Why a run has no record.
-    pub fn failure_file(&self, id: &str) -> PathBuf {
+    pub(crate) fn failure_file(&self, id: &str) -> PathBuf {
         self.folder.join("runs").join(format!("{id}.failed"))
     }
 
@@ -227,7 +227,7 @@ impl Store {
     ///
     /// # Errors
     /// As [`Store::put`].
-    pub fn put_sealed<T: Serialize>(path: &Path, value: &T) -> Result<()> {
+    pub(crate) fn put_sealed<T: Serialize>(path: &Path, value: &T) -> Result<()> {
         let fail = |e| Error::io("write", path, io::Error::other(e));
         // What is read again is what is hashed.
         let text = serde_json::to_string(value).map_err(fail)?;
@@ -239,7 +239,7 @@ impl Store {
     ///
     /// # Errors
     /// As [`Store::put`].
-    pub fn put_failure(&self, job: &Job, why: &str) -> Result<()> {
+    pub(crate) fn put_failure(&self, job: &Job, why: &str) -> Result<()> {
         Store::put(&self.failure_file(&job.id), &self.missing(job, Some(why.to_string())))
     }
 
@@ -247,7 +247,7 @@ impl Store {
     ///
     /// # Errors
     /// As [`Store::facts`] and [`Store::put`].
-    pub fn add_machine(&self, machine: &Machine) -> Result<()> {
+    pub(crate) fn add_machine(&self, machine: &Machine) -> Result<()> {
         let mut machines = self.machines()?;
         if machines.contains(machine) {
             return Ok(());

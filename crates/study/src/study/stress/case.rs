@@ -109,7 +109,7 @@ impl Case {
     }
 
     /// Whether it is small enough for everything to be tried.
-    pub fn is_light(&self) -> bool {
+    pub(crate) fn is_light(&self) -> bool {
         self.fragments() <= LIGHT
     }
 

@@ -144,7 +144,10 @@ impl Agreement {
 ///
 /// # Errors
 /// As [`stress`].
-pub fn stress_designs(seeds: u32, progress: impl FnMut(&str, u64, u64)) -> Result<Stability> {
+pub(crate) fn stress_designs(
+    seeds: u32,
+    progress: impl FnMut(&str, u64, u64),
+) -> Result<Stability> {
     let progress = RefCell::new(progress);
     let told = |what: &str, done, total| (progress.borrow_mut())(what, done, total);
     stress(&Plan { program: None, gpu: &|| Ok(None), seeds, progress: &told })
