@@ -19,8 +19,8 @@ use crate::study::file::Publication;
 use crate::study::publications::experiment::Lab;
 use crate::study::publications::{Effort, measure_publication};
 
-/// Rerun the publications' experiments and write RESULTS.md with its figures: half an hour on
-/// two cores with what is the default; --part, --side and --seeds make it shorter
+/// Rerun the publications' experiments and write RESULTS.md with its figures: three quarters of an
+/// hour on two cores with what is the default; --part, --side and --seeds make it shorter
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// Where RESULTS.md and the folder 'figures' go
@@ -236,7 +236,7 @@ mod tests {
     fn the_time_follows_the_effort() {
         let usual =
             Effort { seeds: 4, seeds_of_means: 128, side: 800, comparison_side: 128, brief: false };
-        assert_eq!(about(minutes(usual, None, 2)), "47 minutes");
+        assert_eq!(about(minutes(usual, None, 2)), "68 minutes");
         let parts: f64 = PARTS.iter().map(|part| minutes(usual, Some(*part), 2)).sum();
         assert_eq!(parts, minutes(usual, None, 2));
         let small = Effort { side: 128, seeds_of_means: 2, comparison_side: 32, seeds: 2, ..usual };

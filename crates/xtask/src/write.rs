@@ -23,7 +23,7 @@ enum What {
     Golden,
     /// docs/STABILITY.md: hard cases, false claims, faults; minutes
     Stability,
-    /// docs/RESULTS.md, docs/figures and the results in short in README.md; half an hour
+    /// docs/RESULTS.md, docs/figures and the results in short in README.md; three quarters of an hour
     Results,
     /// docs/fuzzing/figures.toml, from which the next STABILITY.md is written; an hour
     Fuzzing,
