@@ -240,7 +240,7 @@ fn reproduce_says_how_long_it_takes_and_keeps_out_of_other_folders() {
     // However it is wrapped.
     let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(
-        help.contains("half an hour on two cores")
+        help.contains("three quarters of an hour on two cores")
             && help.contains("[default: screendoor-results]"),
         "{help}"
     );
