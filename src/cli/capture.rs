@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde::Serialize;
 
-use crate::capture::{CameraOptions, Capture, CaptureOptions, Faces, Order, PatternKind, Unseen};
+use crate::capture::{
+    CameraOptions, Capture, CaptureOptions, Faces, Order, PatternKind, Poses, SplatRules, Unseen,
+};
 use crate::cli::arguments::{self, colour, numbers, option, samples, size};
 use crate::cli::console::{Console, grouped, shown, table};
 use crate::cli::files::{JsonArgument, check, check_scene, report};
@@ -16,7 +18,8 @@ use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::capture::{CrossCheck, GpuCapture};
 use crate::output::OutputFile;
-use crate::scene::{self, LoadOptions, Scene};
+use crate::picture::Space;
+use crate::scene::{self, Axes, LoadOptions, Scene};
 use crate::trace::{
     ColourFormat, ColumnId, Compression, Header, Scalar, TraceWriter, WriteOptions, Written,
 };
@@ -24,16 +27,15 @@ use crate::trace::{
 /// Draw a scene and record its fragments as a trace
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// A .obj, .gltf, .glb, .vdb, .tfx or .ply (compressed Gaussian splats) file, or
-    /// builtin:NAME[:parameter=value,…]
-    /// ('screendoor scenes' lists them)
+    /// A .obj, .gltf, .glb, .ply, .vdb or .tfx file, Gaussian splats as .ply, .splat or .spz, or
+    /// builtin:NAME[:parameter=value,…] ('screendoor scenes' lists them)
     scene: OsString,
     /// The trace to write
     #[arg(long, short, value_name = "TRACE")]
     output: PathBuf,
-    /// Frame size in pixels
-    #[arg(long, default_value = "800x800", value_name = "WxH", value_parser = size)]
-    size: (u32, u32),
+    /// Frame size in pixels: that of --camera, or 800x800, where not given
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    size: Option<(u32, u32)>,
     /// Samples per pixel: 64 where not given, 4 with --gpu, 16 with --pattern standard; a
     /// trace of 64 serves every smaller count too
     #[arg(long, value_name = "N", value_parser = samples, allow_negative_numbers = true)]
@@ -77,6 +79,24 @@ pub(super) struct Arguments {
     /// Camera: vertical field of view in degrees; 0 for parallel lines
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
     fov: Option<f64>,
+    /// Camera: the first, or that of --camera-name, of a cameras.json or transforms.json, in the
+    /// space of the scene's file
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["angle", "distance", "fov"])]
+    camera: Option<PathBuf>,
+    /// Camera: which of --camera, by its picture's name or its number from 0
+    #[arg(long, value_name = "NAME", requires = "camera")]
+    camera_name: Option<String>,
+    /// How Gaussian splats are drawn ('screendoor scenes' lists the rules)
+    #[arg(long, default_value = "inria", value_name = "NAME[:parameter=value,…]")]
+    splat_rules: String,
+    /// Which way is up in the scene's file; where not given, as its format has it by habit: y,
+    /// and in trained splats -y
+    #[arg(long, value_parser = option::<Axes>())]
+    axes: Option<Axes>,
+    /// What colours stand for, and so in what designs blend them: 'encoded' for splats, which
+    /// are trained so, and else 'linear', where not given
+    #[arg(long, value_parser = option::<Space>())]
+    space: Option<Space>,
     /// Linear colour behind the scene, each channel 0 to 65504
     #[arg(long, value_name = "R,G,B", value_parser = colour, allow_hyphen_values = true)]
     background: Option<[f64; 3]>,
@@ -115,6 +135,9 @@ struct Document<'a> {
     check: Option<CrossCheck>,
 }
 
+/// Pixels of a frame of which nothing says the size.
+const DEFAULT_SIZE: (u32, u32) = (800, 800);
+
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let (source, path) = arguments::scene(&arguments.scene)?;
     if arguments.output == Path::new("-") {
@@ -125,8 +148,20 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     }
     // A misspelt name and a machine without a GPU are told before anything is done.
     scene::check(source)?;
+    let splats = SplatRules::parse(&arguments.splat_rules)?;
+    let poses = arguments.camera.as_deref().map(|path| {
+        let (width, height) = arguments.size.unwrap_or(DEFAULT_SIZE);
+        Poses::read(path, [width, height])
+    });
+    let poses = poses.transpose()?;
+    let pose = poses.as_ref().map(|all| all.choose(arguments.camera_name.as_deref()));
+    let pose = pose.transpose()?.cloned();
     let gpu = arguments.gpu.then(|| Gpu::open(arguments.adapter.as_deref())).transpose()?;
-    let inputs: Vec<&Path> = path.into_iter().chain(arguments.texture.as_deref()).collect();
+    let inputs: Vec<&Path> = path
+        .into_iter()
+        .chain(arguments.texture.as_deref())
+        .chain(arguments.camera.as_deref())
+        .collect();
     let outputs: Vec<&Path> =
         [&*arguments.output].into_iter().chain(arguments.json.path()).collect();
     check(&inputs, &outputs)?;
@@ -134,9 +169,14 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let file = OutputFile::create(&arguments.output)?;
     let json = arguments.json.open()?;
     let loading = console.progress("loading the scene", "");
-    let load = LoadOptions { grid: arguments.grid.clone(), allow_outside: arguments.allow_outside };
+    let load = LoadOptions {
+        grid: arguments.grid.clone(),
+        allow_outside: arguments.allow_outside,
+        axes: arguments.axes,
+    };
     let mut scene = scene::load_with(source, &load)?;
     drop(loading);
+    scene.warnings.extend(poses.into_iter().flat_map(|poses| poses.warnings));
     if let Some(texture) = &arguments.texture {
         scene.apply_texture(texture)?;
     }
@@ -144,7 +184,8 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     if arguments.white {
         scene.whiten();
     }
-    let (width, height) = arguments.size;
+    let own_size = pose.as_ref().map(|pose| (pose.size[0], pose.size[1]));
+    let (width, height) = arguments.size.or(own_size).unwrap_or(DEFAULT_SIZE);
     let options = CaptureOptions {
         width,
         height,
@@ -165,7 +206,10 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
             angle: arguments.angle,
             distance: arguments.distance,
             field_of_view: arguments.fov,
+            pose,
         },
+        splats,
+        space: arguments.space,
     };
     let write = WriteOptions { compression: arguments.compress, ..WriteOptions::default() };
     let reporting = Reporting { scene: &scene, unseen: true, strict: arguments.strict };
@@ -284,7 +328,7 @@ impl Reporting<'_> {
         self.warn(&self.scene.warnings, console)?;
         let place = file.path().display().to_string();
         let mut writer = TraceWriter::new(file, &place, header.clone(), options)?;
-        let progress = console.progress("capturing", "triangles");
+        let progress = console.progress("capturing", "primitives");
         capture.draw(&mut writer, &mut |done, total| progress.set(done, total))?;
         drop(progress);
         let (file, written) = writer.finish()?;

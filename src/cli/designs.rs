@@ -56,6 +56,7 @@ impl Needs {
             grid: TileGrid::new(1, 1),
             positions: [[0; 2]; SAMPLES as usize].into(),
             background: [0.0; 3],
+            space: Default::default(),
             seed: 0,
             colour_bits: 48,
             view: None,

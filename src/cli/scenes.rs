@@ -2,6 +2,7 @@
 
 use clap::Args;
 
+use crate::capture::{RULE_SETS, RuleSet, SPLAT_PARAMS};
 use crate::cli::console::Console;
 use crate::cli::designs::print_params;
 use crate::cli::files::{JsonArgument, report};
@@ -9,7 +10,7 @@ use crate::error::Result;
 use crate::param::Param;
 use crate::scene::builtin::{BUILTINS, Builtin};
 
-/// List the built-in scenes and their parameters
+/// List the built-in scenes and their parameters, and the rules by which splats are drawn
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     #[command(flatten)]
@@ -19,6 +20,15 @@ pub(super) struct Arguments {
 #[derive(serde::Serialize)]
 struct List<'a> {
     scenes: &'a [Document],
+    splat_rules: &'a [Rules],
+    splat_parameters: &'a [Param],
+}
+
+#[derive(serde::Serialize)]
+struct Rules {
+    name: &'static str,
+    help: &'static str,
+    settings: std::collections::BTreeMap<&'static str, &'static str>,
 }
 
 #[derive(serde::Serialize)]
@@ -32,12 +42,24 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let json = arguments.json.open()?;
     let document = |s: &Builtin| Document { name: s.name, summary: s.summary, params: s.params };
     let documents: Vec<Document> = BUILTINS.iter().map(document).collect();
-    let list = List { scenes: &documents };
+    let rules = RULE_SETS.map(|set| Rules {
+        name: set.name,
+        help: set.help,
+        settings: set.settings.iter().copied().collect(),
+    });
+    let list = List { scenes: &documents, splat_rules: &rules, splat_parameters: &SPLAT_PARAMS };
     report(json, "screendoor.scenes", &list, console, || {
         for scene in BUILTINS {
             console.print(format_args!("builtin:{}\n  {}", scene.name, scene.summary))?;
             print_params(scene.params, console)?;
         }
+        console.print(format_args!("capture --splat-rules NAME"))?;
+        for RuleSet { name, help, settings } in RULE_SETS {
+            let set: Vec<String> = settings.iter().map(|(k, v)| format!("{k}={v}")).collect();
+            let set = if set.is_empty() { String::new() } else { format!(" ({})", set.join(", ")) };
+            console.print(format_args!("  {name}: {help}{set}"))?;
+        }
+        print_params(&SPLAT_PARAMS, console)?;
         Ok(())
     })
 }

@@ -115,7 +115,7 @@ fn obj(bytes: &[u8]) -> Result<()> {
 
 /// What is loaded is drawn.
 fn draw(scene: &Scene) -> Result<()> {
-    if scene.triangle_count() as u64 > MOST {
+    if scene.primitive_count() as u64 > MOST {
         return Ok(());
     }
     let options = CaptureOptions { width: 8, height: 8, samples: 4, ..CaptureOptions::default() };

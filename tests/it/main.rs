@@ -28,6 +28,7 @@ mod optional;
 mod python;
 mod results_document;
 mod seal;
+mod splats;
 mod stress;
 mod trace_file;
 mod unbiased;

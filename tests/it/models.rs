@@ -47,7 +47,7 @@ fn gltf_models_load_whole() {
     ];
     for (path, triangles, objects) in cases {
         let scene = model(path);
-        assert_eq!(scene.triangle_count(), triangles, "{path}");
+        assert_eq!(scene.primitive_count(), triangles, "{path}");
         assert_eq!(scene.objects.len(), objects, "{path}");
         assert!(look(&scene, None).depth_complexity.mean > 1.0, "{path}");
     }
@@ -63,12 +63,12 @@ fn gltf_models_load_whole() {
 #[ignore = "needs SCREENDOOR_MODELS"]
 fn obj_models_load_whole() {
     let drape = model("codimipc_multilayer_drape.obj");
-    assert_eq!(drape.triangle_count(), 84_159);
+    assert_eq!(drape.primitive_count(), 84_159);
     let stats = look(&drape, Some(0.4));
     assert!(stats.depth_complexity.max > 20);
 
     let mut leaves = model("oak_large_leaves.obj");
-    assert_eq!(leaves.triangle_count(), 10_560);
+    assert_eq!(leaves.primitive_count(), 10_560);
     let cards = look(&leaves, None);
     leaves.apply_texture(Path::new(&folder().join("oak_leaf_color.png"))).unwrap();
     let cut = look(&leaves, None);
@@ -80,17 +80,17 @@ fn obj_models_load_whole() {
 #[ignore = "needs SCREENDOOR_MODELS"]
 fn clouds_and_hair_load_whole() {
     let smoke = model("openusd_smoke_000003.vdb");
-    let billboards = smoke.triangle_count() / 2;
+    let billboards = smoke.primitive_count() / 2;
     // Its 90 197 active voxels without those next to empty.
     assert!((60_000..90_197).contains(&billboards), "{billboards}");
     let stats = look(&smoke, None);
     assert!(stats.depth_complexity.mean > 50.0 && stats.alpha.max < 0.05);
 
     let hair = model("Ratboy_mohawk.tfx");
-    assert_eq!(hair.triangle_count(), 2228 * 31 * 2);
+    assert_eq!(hair.primitive_count(), 2228 * 31 * 2);
     assert!(look(&hair, None).depth_complexity.mean > 3.0);
 
     let guitar = model("guitar.compressed.ply");
-    assert_eq!(guitar.triangle_count(), 90_854 * 2);
+    assert_eq!(guitar.primitive_count(), 90_854 * 2);
     assert!(look(&guitar, None).depth_complexity.mean > 50.0);
 }

@@ -21,6 +21,7 @@ fn cameras() -> Vec<CameraOptions> {
         angle: Some(angle),
         field_of_view: Some(fov),
         distance,
+        pose: None,
     })
     .collect()
 }
@@ -69,7 +70,7 @@ fn view_depth_is_the_distance_of_known_points() {
     let [a, b, c] = corners();
     let mut kinds = [0, 0];
     for camera in cameras() {
-        let trace = capture(&scene, SIDE, camera);
+        let trace = capture(&scene, SIDE, camera.clone());
         let view = trace.header().view.unwrap();
         kinds[view.projection as usize] += 1;
         let fragments: Vec<Fragment> =

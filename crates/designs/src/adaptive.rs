@@ -195,6 +195,7 @@ mod tests {
             grid: TileGrid::new(1, 1),
             positions: [[0, 0]].into(),
             background: [0.0; 3],
+            space: Default::default(),
             seed: 0,
             colour_bits: 96,
             view: None,

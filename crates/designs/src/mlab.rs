@@ -84,6 +84,7 @@ mod tests {
             grid: TileGrid::new(1, 1),
             positions: [[0, 0]].into(),
             background: [1.0; 3],
+            space: Default::default(),
             seed: 0,
             colour_bits: 48,
             view: None,

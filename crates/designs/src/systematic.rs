@@ -46,20 +46,20 @@ screendoor_trace::options! {
     /// Where the two samples of each pair of a fragment exchange their places at random.
     pub enum Exchange {
         Never = "never": "nowhere: aliases at an alpha of 1/2",
-        Half = "half": "with more than 16 samples and alpha within half a sample's share of 1/2",
+        Half = "half": "where more than 16 samples of a fragment follow and alpha is within half a sample's share of 1/2",
         Always = "always": "everywhere",
     }
 }
 
 impl Exchange {
-    /// Whether it is done with a threshold in pixels of so many samples.
+    /// Whether it is done with a threshold by a fragment of so many samples.
     #[inline(always)]
-    fn holds(self, threshold: Threshold, samples: usize) -> bool {
+    fn holds(self, threshold: Threshold, samples: u32) -> bool {
         const HALF: u64 = 1 << 31;
         match self {
             Exchange::Never => false,
             Exchange::Half => {
-                samples > FEW && threshold.value().abs_diff(HALF) <= HALF / samples as u64
+                samples > FEW && threshold.value().abs_diff(HALF) <= HALF / u64::from(samples)
             }
             Exchange::Always => true,
         }
@@ -67,7 +67,7 @@ impl Exchange {
 }
 
 /// So many samples are too few to alias.
-const FEW: usize = 16;
+const FEW: u32 = 16;
 
 const PHASE: Typed<Phase> = Typed::choice("phase", "sum", "how the samples of a surface follow");
 const DITHER: Typed<Dither> =
@@ -222,7 +222,7 @@ impl References for Evenly {
             Phase::Count => (before.wrapping_add(threshold.wrapping_mul(n - of.place)), before),
         };
         *kept = Some(after);
-        if !self.exchange.holds(of.opacity, N) {
+        if !self.exchange.holds(of.opacity, of.count) {
             return (comb(start, of.place, of.opacity), hashes);
         }
         let place = exchanged(of.place, pairs(&of.round, of.key, of.count));
@@ -293,23 +293,23 @@ impl<const N: usize> FastReferences<N> for Evenly {
         };
         let end = start.wrapping_add(threshold.wrapping_mul(count));
         *kept = Some(if self.phase == Phase::Sum { end } else { xi });
-        let exchanges = exchanges::<N, _>(self.exchange, &samples, tally);
+        let exchanges = exchanges(self.exchange, &samples, tally);
         evenly(simd, loaded, (start, exchanges), limit)
     }
 }
 
 /// [`pairs`] of a fragment, where its pairs exchange their places.
 #[inline(always)]
-fn exchanges<const N: usize, P: Probe>(
+fn exchanges<P: Probe>(
     exchange: Exchange,
     samples: &Numbered<'_>,
     tally: &mut Tally<'_, P>,
 ) -> u32 {
     let Numbered { of, limit, count, .. } = samples;
-    if !exchange.holds(limit.threshold(), N) {
+    if *count == 0 || !exchange.holds(limit.threshold(), *count) {
         return 0;
     }
-    tally.hashed(u32::from(*count > 0));
+    tally.hashed(1);
     pairs(&of.round, of.key, *count)
 }
 
@@ -367,7 +367,7 @@ impl<const N: usize> FastReferences<N> for Summed {
             (false, false) => first(base),
         };
         *kept = (start.wrapping_add(threshold.wrapping_mul(count)), begun || count > 0);
-        let exchanges = exchanges::<N, _>(Exchange::Half, &samples, tally);
+        let exchanges = exchanges(Exchange::Half, &samples, tally);
         evenly(simd, loaded, (start, exchanges), limit)
     }
 }
@@ -456,12 +456,15 @@ mod tests {
 
     #[test]
     fn at_an_alpha_of_a_half_two_patterns_become_many() {
-        let patterns = |exchange| {
-            let of = |seed| passes(evenly(Phase::Sum, exchange), seed, &[(0.5, 8)]);
-            (0..64).map(of).collect::<std::collections::HashSet<_>>().len()
+        let patterns = |samples| {
+            [Exchange::Never, Exchange::Half, Exchange::Always].map(|exchange| {
+                let of = |seed| passes(evenly(Phase::Sum, exchange), seed, &[(0.5, samples)]);
+                (0..64).map(of).collect::<std::collections::HashSet<_>>().len()
+            })
         };
-        // Of 2^4 with four pairs.
-        let found = [Exchange::Never, Exchange::Half, Exchange::Always].map(patterns);
-        assert_eq!(found, [2, 16, 16]);
+        // Of 2^4 with four pairs; of 2^16 with sixteen, hardly one twice.
+        assert_eq!(patterns(8), [2, 2, 16]);
+        let [never, half, always] = patterns(32);
+        assert!(never == 2 && half > 60 && always > 60, "{never} {half} {always}");
     }
 }

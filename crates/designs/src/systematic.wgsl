@@ -35,9 +35,9 @@ fn references_start() {
 }
 
 // Exchange::holds.
-fn exchanges_pairs(opacity: Threshold) -> bool {
+fn exchanges_pairs(opacity: Threshold, count: u32) -> bool {
     let away = select(0x80000000u - opacity.low, opacity.low - 0x80000000u, opacity.low > 0x80000000u);
-    let near = SAMPLES > 16u && away <= 0x80000000u / SAMPLES;
+    let near = count > 16u && away <= 0x80000000u / count;
     return EXCHANGE_ALWAYS || (EXCHANGE_HALF && near);
 }
 
@@ -58,7 +58,7 @@ fn references_begin(round: Round, key: ReferenceKey, opacity: Threshold, number:
         start = xi + opacity.low * number;
     }
     pairs = 0u;
-    if exchanges_pairs(opacity) {
+    if exchanges_pairs(opacity, count) {
         let word = hash_on(hash4(key.seed, key.pixel, key.surface, round.index), 0x0badcab5u);
         pairs = among(word, count);
     }

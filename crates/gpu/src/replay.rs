@@ -429,7 +429,8 @@ impl<'a> GpuRun<'a> {
         self.seconds.device = self.timer.seconds(self.gpu)?;
         self.seconds.back = begun.elapsed().as_secs_f64();
         self.seconds.wall = self.start.elapsed().as_secs_f64();
-        Ok(Picture::from_tiles(self.frame.background.map(f64::from), finished))
+        let background = self.frame.background.map(f64::from);
+        Ok(Picture::from_tiles(background, finished).in_space(self.frame.space))
     }
 
     fn resolved(&self, step: &Step) -> Result<Vec<(TileId, TilePixels)>> {

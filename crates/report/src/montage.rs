@@ -32,7 +32,8 @@ pub(crate) fn montage(panels: &[Panel<'_>], columns: u32) -> Picture {
     let columns = columns.min(panels.len() as u32);
     let rows = (panels.len() as u32).div_ceil(columns);
     let grid = TileGrid::new(columns * (width + GAP) - GAP, rows * (height + GAP) - GAP);
-    Picture::from_fn(grid, |x, y| {
+    let space = panels.first().expect("panels").picture.space();
+    let montage = Picture::from_fn(grid, |x, y| {
         let (column, row) = (x / (width + GAP), y / (height + GAP));
         let (x, y) = (x % (width + GAP), y % (height + GAP));
         let index = (row * columns + column) as usize;
@@ -42,7 +43,8 @@ pub(crate) fn montage(panels: &[Panel<'_>], columns: u32) -> Picture {
         };
         let (x, y) = (x / panel.enlarge, y / panel.enlarge);
         if x < *w && y < *h { panel.picture.get(left + x, top + y) } else { white }
-    })
+    });
+    montage.in_space(space)
 }
 
 #[cfg(test)]

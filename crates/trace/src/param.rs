@@ -217,11 +217,11 @@ pub trait Options: Copy + 'static {
 #[macro_export]
 macro_rules! options {
     ($(#[$meta:meta])* $vis:vis enum $name:ident {
-        $($variant:ident = $text:literal : $help:literal),+ $(,)?
+        $($(#[$on:meta])* $variant:ident = $text:literal : $help:literal),+ $(,)?
     }) => {
         $(#[$meta])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        $vis enum $name { $(#[doc = $help] $variant),+ }
+        $vis enum $name { $(#[doc = $help] $(#[$on])* $variant),+ }
 
         impl $crate::param::Options for $name {
             const CHOICES: &'static [$crate::param::Choice] =

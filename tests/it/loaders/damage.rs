@@ -95,10 +95,16 @@ pub fn good_files() -> Vec<(&'static str, Vec<u8>)> {
     let hair = tfx::tfx(4, 8, |_| ());
     let packed = vdb::Written { packing: 6, half: true, ..vdb::full() }.bytes();
     let zipped = vdb::Written { packing: 3, tile: Some(0.5), ..vdb::full() }.bytes();
-    let splats = splats::splats(&[[0x1234_5678, 0x4567_89ab, 0x89ab_cdef, 0xffee_ddcc]; 20]);
+    let packed_splats = splats::splats(&[[0x1234_5678, 0x4567_89ab, 0x89ab_cdef, 0xffee_ddcc]; 20]);
     vec![
         ("a.tfx", hair),
-        ("a.ply", splats),
+        ("a.ply", packed_splats),
+        ("b.ply", splats::trained("ascii")),
+        ("c.ply", splats::trained("binary_little_endian")),
+        ("d.ply", splats::MESH.into()),
+        ("a.splat", splats::packed()),
+        ("a.spz", splats::spz(2, true)),
+        ("b.spz", splats::spz(4, false)),
         ("b.vdb", packed),
         ("c.vdb", zipped),
         ("a.obj", text.into()),
@@ -114,7 +120,10 @@ fn damaged_files_load_or_give_one_error() {
     let files = good_files();
     let good: Vec<(&str, &[u8])> = files.iter().map(|(name, bytes)| (*name, &bytes[..])).collect();
     let folder = folder(&good);
-    for name in ["a.obj", "a.gltf", "a.glb", "a.tfx", "a.ply", "b.vdb", "c.vdb"] {
+    for name in [
+        "a.obj", "a.gltf", "a.glb", "a.tfx", "a.ply", "b.ply", "c.ply", "d.ply", "a.splat",
+        "a.spz", "b.spz", "b.vdb", "c.vdb",
+    ] {
         load_in(folder.path(), name).unwrap_or_else(|e| panic!("{name}: {e}"));
     }
     // SCREENDOOR_MUTATIONS: for a longer search, how many changes to each file.

@@ -108,7 +108,7 @@ fn vertex_colours_are_srgb() {
 #[test]
 fn what_is_not_drawn_is_named() {
     let scene = input("nurbs.obj");
-    assert_eq!(scene.triangle_count(), 2);
+    assert_eq!(scene.primitive_count(), 2);
     warned(&scene, 1, &["curves and surfaces are not drawn", "surf in line 12"]);
 }
 
@@ -118,13 +118,13 @@ fn normals_that_are_none_are_those_of_the_triangle() {
         let scene = input(name);
         assert_eq!(scene.warnings, [""; 0]);
         shows(&scene, [LIT, LIT, LIT, 1.0]);
-        assert_eq!(scene.triangle_count(), 2);
+        assert_eq!(scene.primitive_count(), 2);
     }
 }
 
 #[test]
 fn utf16_is_read() {
-    assert_eq!(input("utf16.obj").triangle_count(), 1);
+    assert_eq!(input("utf16.obj").primitive_count(), 1);
 }
 
 #[test]

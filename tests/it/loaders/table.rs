@@ -140,7 +140,7 @@ fn round(corners: usize) -> String {
 
 fn obj_cases() -> Vec<Case> {
     let case = |feature, does| Case { section: "OBJ", feature, does };
-    let one = |scene: &Scene| assert_eq!((scene.triangle_count(), area(scene)), (1, 0.5));
+    let one = |scene: &Scene| assert_eq!((scene.primitive_count(), area(scene)), (1, 0.5));
     let coloured = |a: &str| obj(format!("v 0 0 0 {a}\nv 1 0 0 {a}\nv 0 1 0 {a}\nf 1 2 3\n"));
     let utf16: Vec<u8> =
         format!("\u{feff}{TRIANGLE}f 1 2 3\n").encode_utf16().flat_map(u16::to_be_bytes).collect();
@@ -205,7 +205,7 @@ fn obj_cases() -> Vec<Case> {
         case(
             "`f v/vt/vn`",
             Shows(obj(format!("f 1 2 3\n{TRIANGLE}f -3 -2 -1\n")), |scene| {
-                assert_eq!((scene.triangle_count(), area(scene)), (2, 1.0));
+                assert_eq!((scene.primitive_count(), area(scene)), (2, 1.0));
             }),
         ),
         case(
@@ -228,7 +228,7 @@ fn obj_cases() -> Vec<Case> {
         case(
             "a concave polygon",
             Shows(obj("v 0 0 0\nv 2 1 0\nv 0 2 0\nv 0.5 1 0\nf 1 2 3 4\n"), |scene| {
-                assert_eq!((scene.triangle_count(), area(scene)), (2, 1.5));
+                assert_eq!((scene.primitive_count(), area(scene)), (2, 1.5));
             }),
         ),
         case(
@@ -256,13 +256,13 @@ fn obj_cases() -> Vec<Case> {
         case(
             "a polygon that is not plane",
             Shows(obj("v 0 0 0\nv 2 1 0.25\nv 0 2 0\nv 0.5 1 0.25\nf 1 2 3 4\n"), |scene| {
-                assert_eq!(scene.triangle_count(), 2);
+                assert_eq!(scene.primitive_count(), 2);
                 assert_eq!(mesh(scene, 0).positions.iter().filter(|p| p.z == 0.25).count(), 2);
             }),
         ),
         case(
             "a polygon of more than 65536 corners",
-            Shows(obj(round(70_000)), |scene| assert_eq!(scene.triangle_count(), 69_998)),
+            Shows(obj(round(70_000)), |scene| assert_eq!(scene.primitive_count(), 69_998)),
         ),
         case(
             "a polygon of more than 65536 corners that is no such fan",
@@ -592,8 +592,13 @@ fn other_cases() -> Vec<Case> {
     let vdb = |feature, does| Case { section: "OpenVDB", feature, does };
     let file = |name: &'static str, bytes: Vec<u8>| -> Files { vec![(name, bytes)] };
     let written = |written: Written| file("a.vdb", written.bytes());
-    let mesh = "ply\nformat binary_little_endian 1.0\nelement vertex 0\nproperty float x\n\
-                element face 0\nproperty list uchar int vertex_indices\nend_header\n";
+    let splat = |feature, does| Case { section: "Splats", feature, does };
+    let edited = |from: &str, to: &str| file("a.ply", splats::MESH.replace(from, to).into());
+    let trained = |from: &str, to: &str| {
+        let text = String::from_utf8(splats::trained("ascii")).unwrap().replace(from, to);
+        file("a.ply", text.into_bytes())
+    };
+    let raw = [&b"NGSP\x02\0\0\0\x01\0\0\0\0\x0c\0\0"[..], &[0; 19]].concat();
     let thick = |word: usize| {
         let mut bytes = tfx(3, 4, |head| head[word] = 352);
         bytes.extend([0; 36]);
@@ -607,16 +612,71 @@ fn other_cases() -> Vec<Case> {
         ply(
             "compressed Gaussian splats (PlayCanvas)",
             Shows(file("a.ply", splats(&[splats::SPLAT; 3])), |scene| {
-                assert_eq!(particles(scene).axes.len(), 3);
+                assert_eq!(splats::found(scene).means.len(), 3);
             }),
         ),
         ply(
-            "spherical harmonics of compressed splats",
-            Says(file("a.ply", splats::with_harmonics()), "direction of view"),
+            "text, bytes in either order",
+            Shows(trained("NaN", "1"), |scene| {
+                let same = load(&vec![("a.ply", splats::trained("binary_big_endian"))]).unwrap();
+                let [one, other] = [scene, &same].map(splats::found);
+                assert_eq!((one.means[0], one.degree), (other.means[0], other.degree));
+            }),
         ),
         ply(
-            "meshes and point clouds",
-            Says(file("a.ply", mesh.into()), "no compressed Gaussian splats"),
+            "trained Gaussian splats",
+            Shows(trained("NaN", "1"), |scene| assert_eq!(splats::found(scene).degree, 1)),
+        ),
+        ply(
+            "splats with a place, size, turn, opacity or colour that is not finite",
+            Says(trained("", ""), "1 splats have no finite place"),
+        ),
+        ply(
+            "splats of a number of harmonics that is no degree's",
+            Says(trained("float f_rest_8", "float nothing"), "8 properties 'f_rest_'"),
+        ),
+        ply(
+            "splats without opacities",
+            Says(trained("float opacity", "float nothing"), "no property 'opacity'"),
+        ),
+        ply(
+            "meshes: faces of any number of corners, normals, texture coordinates",
+            Shows(edited("property float s", "property float u"), |scene| {
+                assert_eq!(mesh(scene, 0).triangles.len(), 2);
+            }),
+        ),
+        ply(
+            "colours and alphas of vertices",
+            Shows(edited("", ""), |scene| assert_eq!(mesh(scene, 0).colours[1].y, 1.0)),
+        ),
+        ply(
+            "colours of faces",
+            Says(
+                edited(
+                    "end_header",
+                    "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header",
+                )
+                .into_iter()
+                .map(|(name, mut bytes)| {
+                    bytes.extend(b"1 2 3\n");
+                    (name, bytes)
+                })
+                .collect(),
+                "faces' own colours",
+            ),
+        ),
+        ply("triangle strips", Says(edited("element face", "element tristrips"), "in strips")),
+        ply("point clouds", Says(edited("element face", "element edge"), "faces of a mesh")),
+        splat(
+            "`.splat` (antimatter15)",
+            Shows(file("a.splat", splats::packed()), |scene| {
+                assert_eq!(splats::found(scene).means.len(), 2);
+            }),
+        ),
+        splat("`.spz` of versions 1 to 4", Says(file("a.spz", splats::spz(3, false)), "--axes")),
+        splat(
+            "`.spz` of versions 1 to 3 that is not compressed",
+            Says(file("a.spz", raw), "not compressed by gzip"),
         ),
         hair(
             "points of strands",

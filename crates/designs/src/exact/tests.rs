@@ -17,6 +17,7 @@ fn frame(samples: u32, random: &mut Stream) -> Frame {
         grid: TileGrid::new(16, 16),
         positions: (0..samples).map(|_| [offset(), offset()]).collect(),
         background: [0.25, -3.0, 1e30],
+        space: Default::default(),
         seed: 0,
         colour_bits: 48,
         view: None,

@@ -10,6 +10,7 @@ fn frame(seed: u32) -> Frame {
         grid: TileGrid::new(1, 1),
         positions: [[-4, -4], [4, -4], [-4, 4], [4, 4]].into(),
         background: [0.0; 3],
+        space: Default::default(),
         seed,
         colour_bits: 96,
         view: None,

@@ -12,10 +12,21 @@ screendoor_trace::options! {
     }
 }
 
-/// The reference value of the `n`-th sample: the comb's, of which pairs have exchanged their
-/// teeth at random.
-pub(super) fn paired(xi: u32, n: u32, threshold: Threshold) -> u32 {
-    comb(xi, exchanged(n, exchanges(xi)), threshold)
+/// A fragment's comb, of which pairs have exchanged their teeth at random.
+pub(super) struct Pairs {
+    xi: u32,
+    exchanges: u32,
+}
+
+impl Pairs {
+    pub(super) fn of(xi: u32) -> Self {
+        Pairs { xi, exchanges: exchanges(xi) }
+    }
+
+    /// The reference value of the `n`-th sample.
+    pub(super) fn value(&self, n: u32, threshold: Threshold) -> u32 {
+        comb(self.xi, exchanged(n, self.exchanges), threshold)
+    }
 }
 
 #[cfg(test)]
@@ -28,7 +39,8 @@ mod tests {
             let threshold = Threshold::of(alpha);
             for seed in 0..200 {
                 let xi = screendoor_trace::random::mix(seed);
-                let passed = |n: &u32| threshold.passes(paired(xi, *n, threshold));
+                let pairs = Pairs::of(xi);
+                let passed = |n: &u32| threshold.passes(pairs.value(*n, threshold));
                 for count in (0..=64).step_by(2) {
                     let expected = f64::from(alpha) * f64::from(count);
                     let found = f64::from((0..count).filter(passed).count() as u32);

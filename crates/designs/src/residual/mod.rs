@@ -18,7 +18,7 @@ use std::sync::Arc;
 
 use fearless_simd::Level;
 
-use self::choice::{Drawing, paired};
+use self::choice::{Drawing, Pairs};
 #[cfg(test)]
 use self::errors::Flaw;
 use self::errors::{Drawn, Entry, POINT, Store, Sums, Width};
@@ -223,12 +223,13 @@ impl<const N: usize> ResidualSampler<N> {
             sort_by_stored_depth(&mut list, stored);
             probe.sorted(&list);
         }
+        let pairs = Pairs::of(xi);
         let mut written = SampleMask::NONE;
         for (n, s) in (0..).zip(&list) {
             let value = match self.drawing {
                 #[cfg(test)]
                 Drawing::Paired if self.has(Flaw::NoExchange) => comb::comb(xi, n, threshold),
-                Drawing::Paired => paired(xi, n, threshold),
+                Drawing::Paired => pairs.value(n, threshold),
                 Drawing::Hashed => self.reference.value(n, N as u32, key),
             };
             probe.reference(*s, n, value, threshold);

@@ -266,22 +266,19 @@ fn round_sums(xi: u32) {
     }
 }
 
-// choice::paired.
-fn paired(xi: u32, n: u32, threshold: Threshold) -> u32 {
-    return comb(xi, exchanged(n, exchanges(xi)), threshold);
-}
-
 // Sampler::choose.
 fn choose(round: Round, passed: Mask, f: Fragment) -> Mask {
     let threshold = threshold_of(f.alpha);
     let key = ReferenceKey(pixel_id, fragments, round.seed);
     fragments += 1u;
     let xi = dither_in_round(site.x, site.y, key, round.index, round.count_log2);
+    // choice::Pairs.
+    let pairs = exchanges(xi);
     var written = MASK_NONE;
     for (var s = 0u; s < SAMPLES; s++) {
         if mask_contains(passed, s) {
             let place = place_among(passed, s, SORT);
-            var value = paired(xi, place, threshold);
+            var value = comb(xi, exchanged(place, pairs), threshold);
             if DRAWN_HASHED {
                 value = reference_value(place, SAMPLES_LOG2, key);
             }

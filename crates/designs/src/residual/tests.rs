@@ -37,6 +37,7 @@ impl<const N: usize> Pixel<N> {
             grid: TileGrid::new(8, 8),
             positions: (0..N as i8).map(|s| [s % 8 * 2 - 8, s / 8 * 2 - 8]).collect(),
             background: BACKGROUND,
+            space: Default::default(),
             seed,
             colour_bits: 96,
             view: None,

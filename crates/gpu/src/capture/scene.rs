@@ -82,7 +82,7 @@ impl<'a> GpuCapture<'a> {
         progress: impl FnMut(u64, u64),
     ) -> Result<()> {
         let positions = &self.header().pattern.positions;
-        let drawing = self.capture.drawing();
+        let drawing = self.capture.drawing()?;
         self.each_part(&drawing, progress, |fragments| {
             let triangles: Vec<&[RawFragment]> = by_triangle(&fragments).collect();
             let shade = |raw: &&[RawFragment]| -> Vec<Fragment> {
@@ -130,7 +130,7 @@ impl<'a> GpuCapture<'a> {
                 format_args!("give a pattern of {SAMPLES}"),
             ));
         }
-        let drawing = self.capture.drawing();
+        let drawing = self.capture.drawing()?;
         let mut check = CrossCheck::default();
         let mut compare = |triangles: Range<usize>, fragments: &[RawFragment]| {
             let mut lists = by_triangle(fragments).peekable();

@@ -11,7 +11,7 @@ use arrow_ipc::reader::FileReader;
 use super::table::{Cell, Column, Kind, columns};
 use super::*;
 use screendoor_study::metrics::Estimate;
-use screendoor_study::study::analysis::made_up::{exactly, plausible};
+use screendoor_study::study::analysis::made_up::plausible;
 use screendoor_study::study::file::{SceneEntry, Study};
 use screendoor_study::study::record::Record;
 use screendoor_study::study::throughput::Spread;
@@ -21,9 +21,9 @@ fn records() -> Vec<Record> {
     let mut records = plausible(3, 18, &[4, 8]).records;
     records[1].series = "a \"quoted\", b;\n=1+1|".into();
     records[2].covered.rmse =
-        Estimate { low: f64::NEG_INFINITY, high: f64::INFINITY, ..exactly(3.5) };
-    records[2].fine = exactly(0.1 + 0.2);
-    records[2].blocks = Some(exactly(0.25));
+        Estimate { low: f64::NEG_INFINITY, high: f64::INFINITY, ..Estimate::exactly(3.5) };
+    records[2].fine = Estimate::exactly(0.1 + 0.2);
+    records[2].blocks = Some(Estimate::exactly(0.25));
     records[3].events.hashes = u64::MAX;
     let gpu = records[3].speed.get_mut("gpu").unwrap();
     gpu.kernel = Some(Spread { low: 1e-9, median: 2e-7, high: 0.3 });
@@ -42,7 +42,7 @@ fn json_lines_read_back_as_the_records() {
     assert_eq!(read, records);
     // What is not known stays so: NaN does not equal itself.
     let mut unknown = records[0].clone();
-    unknown.edges.rmse = exactly(f64::NAN);
+    unknown.edges.rmse = Estimate::exactly(f64::NAN);
     let read: Record = serde_json::from_slice(&json_lines(&[unknown])).unwrap();
     assert!(read.edges.rmse.value.is_nan());
 }
@@ -215,6 +215,11 @@ fn whole_scene(small: &SceneEntry) -> SceneEntry {
         angle: Some([0.0; 2]),
         distance: Some(1.0),
         fov: Some(1.0),
+        camera: Some(String::new()),
+        camera_name: Some(String::new()),
+        splat_rules: Some(String::new()),
+        axes: Some(Default::default()),
+        space: Some(Default::default()),
         background: Some([0.0; 3]),
         pixel: Some([0; 2]),
     }

@@ -44,7 +44,7 @@ fn chart(content: &Content<'_>, scene: &str) -> Markup {
             marks.push(Mark {
                 id: Some(record.id.clone()),
                 samples: Some(*samples),
-                cost: Spread { low: n, median: n, high: n },
+                cost: Spread::exactly(n),
                 error: record.covered.rmse,
                 says: format!(
                     "{series} at {}\n{} of 255 RMSE",

@@ -79,7 +79,7 @@ fn parts(record: &Record) -> Option<(f64, Estimate)> {
         (Some(variance), Some(bias)) => Some((variance, bias)),
         _ => (!record.promises.seeded).then(|| {
             let value = e.rmse.value * e.rmse.value;
-            (0.0, Estimate { value, low: value, high: value })
+            (0.0, Estimate::exactly(value))
         }),
     }
 }

@@ -83,11 +83,12 @@ fn deflate(bytes: &[u8], level: Compression) -> Vec<u8> {
     written.expect("memory takes all that is written")
 }
 
-/// The bits of the pixels in single precision, row by row.
+/// The bits of the pixels' amounts of light in single precision, row by row.
 fn words(picture: &Picture) -> Vec<[u32; 3]> {
     let row = |y| (0..picture.width()).map(move |x| (x, y));
     let pixels = (0..picture.height()).flat_map(row);
-    pixels.map(|(x, y)| picture.get(x, y).map(|c| (c as f32).to_bits())).collect()
+    let bits = |c| (picture.space().to_linear(c) as f32).to_bits();
+    pixels.map(|(x, y)| picture.get(x, y).map(bits)).collect()
 }
 
 /// What `prediction` leaves over: channel by channel the highest bytes of all

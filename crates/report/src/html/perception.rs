@@ -217,8 +217,8 @@ fn spectrum(content: &Content<'_>, scene: &str) -> Markup {
             .map(|(i, (frequency, power))| Mark {
                 id: Some(record.id.clone()),
                 samples: None,
-                cost: Spread { low: *frequency, median: *frequency, high: *frequency },
-                error: Estimate { value: *power, low: *power, high: *power },
+                cost: Spread::exactly(*frequency),
+                error: Estimate::exactly(*power),
                 says: format!(
                     "{series}\n{} at {} cycles per pixel",
                     figures(*power),

@@ -1,8 +1,8 @@
 //! The results' part on this project's own designs, over many seeds.
 
 use crate::document::{Section, Text};
-use crate::results::expectations::{deviation, within_chance};
-use crate::results::ratios::{OnScenes, holding};
+use crate::results::expectations::on_scenes;
+use crate::results::ratios::OnScenes;
 use screendoor_study::metrics::Estimate;
 use screendoor_study::study::analysis::{ROUNDING, RunName, ratio, ratio_on};
 use screendoor_study::study::publications::beyond::Beyond;
@@ -148,19 +148,9 @@ impl Found {
         let unbiased: Vec<&Record> = records.iter().filter(|r| r.kept().unbiased).collect();
         let inside =
             unbiased.iter().filter(|r| r.covered.mean.low <= 0.0 && r.covered.mean.high >= 0.0);
-        let mut scenes: Vec<&str> = unbiased.iter().map(|r| r.scene.as_str()).collect();
-        scenes.sort_unstable();
-        scenes.dedup();
-        let holds = |scene: &str| {
-            let mut own = unbiased.iter().filter(|r| r.scene == scene);
-            own.all(|r| within_chance(r, unbiased.len()))
-        };
-        Found {
-            unbiased: unbiased.len(),
-            inside: inside.count(),
-            scenes: holding(scenes.into_iter().map(|scene| (scene, holds(scene)))).words(),
-            most: unbiased.iter().map(|r| deviation(r)).fold(0.0, f64::max),
-        }
+        let named = unbiased.iter().map(|r| (r.scene.as_str(), *r)).collect();
+        let (holding, most) = on_scenes(named, unbiased.len());
+        Found { unbiased: unbiased.len(), inside: inside.count(), scenes: holding.words(), most }
     }
 }
 
@@ -203,8 +193,8 @@ mod tests {
     use screendoor_study::study::record::Promise;
 
     fn record(scene: &str, mean: f64) -> Record {
-        let mut record = made_up::record(scene, "residual", 8, made_up::exactly(1.0));
-        record.covered.mean = Estimate { value: mean, low: mean - 0.1, high: mean + 0.1 };
+        let mut record = made_up::record(scene, "residual", 8, Estimate::exactly(1.0));
+        record.covered.mean = Estimate::around(mean, 0.1);
         record.seeds = 64;
         record.promises.unbiased = Promise::Always;
         record

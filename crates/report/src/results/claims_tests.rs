@@ -6,13 +6,13 @@ use screendoor_study::study::analysis::made_up;
 /// An estimate known to a thousandth of it.
 fn known(value: f64) -> Estimate {
     let half = 1e-3 * value.abs().max(1e-3);
-    Estimate { value, low: value - half, high: value + half }
+    Estimate::around(value, half)
 }
 
 /// A variant with an RMSE, the same over blocks, and a mean error.
 pub(in crate::results) fn variant(design: &str, rmse: f64, blocks: f64, mean: f64) -> Record {
     let mut record = made_up::record("", design, 8, known(rmse));
-    record.covered.mean = Estimate { value: mean, low: mean - 0.1, high: mean + 0.1 };
+    record.covered.mean = Estimate::around(mean, 0.1);
     record.covered.variance = Some(rmse * rmse - mean * mean);
     record.covered.bias_squared = Some(known(mean * mean));
     record.blocks = Some(known(blocks));

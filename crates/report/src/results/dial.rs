@@ -128,8 +128,8 @@ pub(super) fn figures(trial: &Trial) -> Vec<(&'static str, Drawn)> {
                 Some(Mark {
                     id: None,
                     samples: Some(*bits),
-                    cost: Spread { low: noise, median: noise, high: noise },
-                    error: Estimate { value: bias, low: bias, high: bias },
+                    cost: Spread::exactly(noise),
+                    error: Estimate::exactly(bias),
                     says: format!(
                         "{}, {}\nnoise {noise:.2}, bias {bias:.2}",
                         scene.name,

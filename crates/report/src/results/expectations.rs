@@ -68,15 +68,28 @@ pub(super) fn section(p: &Publications) -> Option<Section> {
 }
 
 /// How far a mean error lies from 0, in standard errors.
-pub(super) fn deviation(run: &Record) -> f64 {
+fn deviation(run: &Record) -> f64 {
     run.covered.mean.standard_errors(run.seeds as usize)
 }
 
 /// Whether a mean error is within what chance allows where so many are looked at together: 1 in
 /// 100 for all of them (Bonferroni).
-pub(super) fn within_chance(run: &Record, together: usize) -> bool {
+fn within_chance(run: &Record, together: usize) -> bool {
     let confidence = 1.0 - 0.01 / together.max(1) as f64;
     deviation(run) <= student_t(confidence, run.seeds as usize)
+}
+
+/// On which scenes all mean errors are within what chance allows where so many are looked at
+/// together, and the largest in standard errors.
+pub(super) fn on_scenes(runs: Vec<(&str, &Record)>, together: usize) -> (Holding, f64) {
+    let mut scenes: Vec<&str> = runs.iter().map(|(scene, _)| *scene).collect();
+    scenes.sort_unstable();
+    scenes.dedup();
+    let within = |scene: &str| {
+        runs.iter().filter(|(of, _)| *of == scene).all(|(_, run)| within_chance(run, together))
+    };
+    let most = runs.iter().map(|(_, run)| deviation(run)).fold(0.0, f64::max);
+    (holding(scenes.into_iter().map(|scene| (scene, within(scene)))), most)
 }
 
 /// Where mean errors are within what chance allows.
@@ -90,18 +103,12 @@ struct Found {
 impl Found {
     /// Of all mean errors, looked at together: 1 in 100 for the whole table.
     fn of(means: &[MeanError]) -> Self {
-        let within = |m: &MeanError| within_chance(&m.run, means.len());
-        let on_scenes = |which: &dyn Fn(&MeanError) -> bool| {
-            let chosen: Vec<&MeanError> = means.iter().filter(|m| which(m)).collect();
-            let mut scenes: Vec<&str> = chosen.iter().map(|m| m.scene.as_str()).collect();
-            scenes.sort_unstable();
-            scenes.dedup();
-            let all = |scene: &str| chosen.iter().filter(|m| m.scene == scene).all(|m| within(m));
-            let most = chosen.iter().map(|m| deviation(&m.run)).fold(0.0, f64::max);
-            (holding(scenes.into_iter().map(|scene| (scene, all(scene)))), most)
+        let chosen = |which: &dyn Fn(&Record) -> bool| {
+            let those = means.iter().filter(|m| which(&m.run));
+            on_scenes(those.map(|m| (m.scene.as_str(), &m.run)).collect(), means.len())
         };
-        let (lk, lk_most) = on_scenes(&|m| m.run.design == DESIGNS[0]);
-        let (unbiased, unbiased_most) = on_scenes(&|m| m.run.kept().unbiased);
+        let (lk, lk_most) = chosen(&|run| run.design == DESIGNS[0]);
+        let (unbiased, unbiased_most) = chosen(&|run| run.kept().unbiased);
         Found { lk, lk_most, unbiased, unbiased_most }
     }
 }
@@ -114,8 +121,8 @@ mod tests {
     use screendoor_study::study::record::Promise;
 
     fn mean(scene: &str, design: &str, value: f64, unbiased: bool) -> MeanError {
-        let mut run = made_up::record(scene, design, 8, made_up::exactly(1.0));
-        run.covered.mean = Estimate { value, low: value - 0.1, high: value + 0.1 };
+        let mut run = made_up::record(scene, design, 8, Estimate::exactly(1.0));
+        run.covered.mean = Estimate::around(value, 0.1);
         run.seeds = 32;
         run.promises.unbiased = if unbiased { Promise::Always } else { Promise::Never };
         MeanError { scene: scene.to_string(), side: 64, run }

@@ -4,9 +4,8 @@
 use crate::chart::{Axis, Curve, Kind, Mark, Names, Plot, Styles, alone};
 use crate::document::Section;
 use crate::results::Drawn;
-use crate::results::ratios::OnScenes;
 use screendoor_study::metrics::Estimate;
-use screendoor_study::study::analysis::{ROUNDING, front};
+use screendoor_study::study::analysis::{ROUNDING, front, shares};
 use screendoor_study::study::comparison::{COUNTS, Comparison, Contender};
 use screendoor_study::study::publications::experiment::MeasuredScene;
 use screendoor_study::study::record::Record;
@@ -58,8 +57,10 @@ fn without_opaque<'a>(
 /// All that read the trace once, whatever its order, and whose state does not grow.
 fn points<'a>(contenders: &'a [Contender], scenes: &[&'a MeasuredScene]) -> Vec<Point<'a>> {
     let baseline = contenders.iter().find(|c| c.label == BASELINE.0);
-    let to = |s: &&MeasuredScene| s.record(&baseline?.series, BASELINE.1).map(rmse);
-    let Some(to) = scenes.iter().map(to).collect::<Option<Vec<f64>>>() else { return Vec::new() };
+    let to = |s: &&'a MeasuredScene| s.record(&baseline?.series, BASELINE.1);
+    let Some(to) = scenes.iter().map(to).collect::<Option<Vec<&Record>>>() else {
+        return Vec::new();
+    };
     let point = |contender: &'a Contender, samples: u32| {
         let each = scenes.iter().map(|scene| scene.record(&contender.series, samples));
         let records = each.collect::<Option<Vec<&Record>>>()?;
@@ -67,29 +68,20 @@ fn points<'a>(contenders: &'a [Contender], scenes: &[&'a MeasuredScene]) -> Vec<
             return None;
         }
         let bytes = records.iter().map(|r| r.state_bytes()).collect::<Option<Vec<f64>>>()?;
-        let ratios = records.iter().zip(&to).map(|(r, to)| rmse(r) / to).map(without_interval);
-        let named = scenes.iter().map(|scene| scene.name.clone());
+        let pairs: Vec<(&Record, &Record)> =
+            records.iter().copied().zip(to.iter().copied()).collect();
         Some(Point {
             contender,
             family: records.first()?.family.as_str(),
             samples,
             bytes: bytes.into_iter().fold(0.0, f64::max),
-            error: OnScenes(named.zip(ratios).collect()).mean(),
+            error: shares(&pairs).value,
             unbiased: records.iter().all(|r| r.kept().unbiased),
             own: contender.label.split(':').next().is_some_and(|name| OWN.contains(&name)),
         })
     };
     let runs = contenders.iter().flat_map(|c| COUNTS.map(|samples| (c, samples)));
     runs.filter_map(|(contender, samples)| point(contender, samples)).collect()
-}
-
-/// An RMSE that a mean of ratios can be made of.
-fn rmse(record: &Record) -> f64 {
-    record.covered.rmse.value.max(ROUNDING)
-}
-
-fn without_interval(value: f64) -> Estimate {
-    Estimate { value, low: value, high: value }
 }
 
 /// Those that nothing among them has less of one of and no more of the other.
@@ -181,8 +173,8 @@ pub(super) fn figures(c: &Comparison) -> Vec<(&'static str, Drawn)> {
             .map(|p| Mark {
                 id: None,
                 samples: Some(p.samples),
-                cost: Spread { low: p.bytes, median: p.bytes, high: p.bytes },
-                error: without_interval(p.error),
+                cost: Spread::exactly(p.bytes),
+                error: Estimate::exactly(p.error),
                 says: format!(
                     "{} at {}\n{:.0} bytes, {:.3}",
                     contender.label, p.samples, p.bytes, p.error
@@ -226,7 +218,7 @@ mod tests {
         let errors = [8.0, 4.0, 1.0, 0.5, 0.5];
         let record = |(name, error): (&&str, &f64), samples: u32| {
             let error = error * 8.0 / f64::from(samples);
-            let mut record = made_up::record("a", name, samples, made_up::exactly(error));
+            let mut record = made_up::record("a", name, samples, Estimate::exactly(error));
             (record.state_bits.samples, record.state_bits.extra) = (64 * samples, 0);
             record.state_bits.unbounded = false;
             record.passes = if *name == "mboit" { 2 } else { 1 };

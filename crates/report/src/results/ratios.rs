@@ -102,7 +102,7 @@ mod tests {
     use super::*;
 
     fn at(value: f64) -> Estimate {
-        Estimate { value, low: value - 0.01, high: value + 0.01 }
+        Estimate::around(value, 0.01)
     }
 
     #[test]

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::contract::primitive_depths::PrimitiveDepths;
 use screendoor_trace::error::Result;
+use screendoor_trace::picture::Space;
 use screendoor_trace::tile::TileGrid;
 use screendoor_trace::trace::{ColourFormat, ColumnSet, Fragment, Trace, Unorm32, View};
 
@@ -14,8 +15,10 @@ pub struct Frame {
     pub grid: TileGrid,
     /// Where each pixel's samples lie, in 1/16 pixel from its centre.
     pub positions: Arc<[[i8; 2]]>,
-    /// Linear colour of a cleared sample.
+    /// Colour of a cleared sample.
     pub background: [f32; 3],
+    /// What the numbers of colours stand for. Designs blend them as they are.
+    pub space: Space,
     /// The run's seed.
     pub seed: u32,
     /// Bits that a stored colour takes.
@@ -44,6 +47,7 @@ impl Frame {
             grid: TileGrid::new(header.width, header.height),
             positions: header.pattern.prefix(samples)?.into(),
             background: header.background,
+            space: header.space,
             seed,
             colour_bits: match header.colour {
                 ColourFormat::F16 => 48,

@@ -100,7 +100,8 @@ pub fn replay(
     }
     let touched_tiles = finished.touched().len();
     Ok(Replayed {
-        picture: Picture::from_tiles(frame.background.map(f64::from), finished),
+        picture: Picture::from_tiles(frame.background.map(f64::from), finished)
+            .in_space(frame.space),
         events,
         state_bits: design.state_bits(),
         layout: design.layout(),

@@ -1,14 +1,19 @@
 //! From the scene's space to the frame.
 
-use glam::{DMat4, DVec3, DVec4};
+mod file;
+mod pose;
 
+use glam::{DMat3, DMat4, DVec3, DVec4};
+
+pub use self::file::Poses;
+pub use self::pose::Pose;
 use crate::scene::Scene;
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::trace::{Projection, View};
 
 /// From where and how wide to look. What is not given follows the scene's own
 /// view, framed so that all of it shows.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct CameraOptions {
     /// Degrees to the right of the scene's front (+z), and above the horizontal.
     pub angle: Option<[f64; 2]>,
@@ -17,6 +22,8 @@ pub struct CameraOptions {
     pub distance: Option<f64>,
     /// Vertical field of view in degrees; 0 looks along parallel lines.
     pub field_of_view: Option<f64>,
+    /// Where it stands, in place of all that.
+    pub pose: Option<Pose>,
 }
 
 /// Degrees from top to bottom where nothing else is asked for.
@@ -25,6 +32,9 @@ const FIELD_OF_VIEW: f64 = 35.0;
 const MARGIN: f64 = 0.03;
 /// The near plane is at least this share of the far plane's distance.
 const NEAREST: f64 = 1e-3;
+/// The same of splats and of poses: some of what is there lies far outside or around the
+/// camera, and none of it is cut by the near plane.
+const NEAREST_AMONG: f64 = 1e-5;
 /// Parallel lines of sight begin nowhere. View space begins this many radii before the
 /// scene's centre where they are recorded, so that distances are those of a perspective
 /// camera about as far away, and above 0.
@@ -44,6 +54,14 @@ pub struct Camera {
     pub(crate) eye: Option<DVec3>,
     /// Frame size in pixels.
     pub(crate) size: [f64; 2],
+    /// Focal lengths in pixels; pixels per unit where lines of sight are parallel.
+    pub(crate) focal: [f64; 2],
+    /// Where the view axis meets the frame, in pixels from its top left.
+    pub(crate) principal: [f64; 2],
+    /// Where distances along the view axis are counted from, and those of the near and the
+    /// far plane.
+    origin: DVec3,
+    range: [f64; 2],
     view: View,
     description: String,
 }
@@ -55,6 +73,9 @@ impl Camera {
     /// # Errors
     /// [`Error::Config`] for options out of range.
     pub fn frame(scene: &Scene, options: &CameraOptions, width: u32, height: u32) -> Result<Self> {
+        if let Some(pose) = &options.pose {
+            return pose.camera(scene, width, height);
+        }
         let view = scene.view;
         let [yaw, pitch] = options.angle.unwrap_or([view.yaw, view.pitch]);
         if !(yaw.is_finite() && (-90.0..=90.0).contains(&pitch)) {
@@ -85,13 +106,13 @@ impl Camera {
         let up = back.cross(right);
 
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for (point, radius) in scene.bounding_points() {
+        for (point, radius) in scene.framed_points() {
             low = low.min(point - radius);
             high = high.max(point + radius);
         }
         let centre = (low + high) * 0.5;
         let mut radius = 0.0_f64;
-        for (point, around) in scene.bounding_points() {
+        for (point, around) in scene.framed_points() {
             radius = radius.max((point - centre).length() + around);
         }
         let radius = if radius > 0.0 { radius } else { 1.0 };
@@ -118,14 +139,16 @@ impl Camera {
         // Something flat still needs a depth range.
         let slack = (1e-3 * radius).max(f64::MIN_POSITIVE);
         let (nearest, furthest) = (nearest + slack, furthest - slack);
+        let framed = scene.framed_points().map(|(point, around)| in_view(point).z + around);
+        let framed = framed.fold(f64::NEG_INFINITY, f64::max) + slack;
 
         // Scene space to the view space of a camera so far before the centre.
         let from =
             |distance: f64| DMat4::from_translation(DVec3::new(0.0, 0.0, -distance)) * to_view;
-        let (to_clip, eye, seen) = if fov == 0.0 {
+        let (to_clip, eye, seen, focal) = if fov == 0.0 {
             let [mut half_width, mut half_height] = view.frame.unwrap_or([0.0; 2]);
             if view.frame.is_none() {
-                for (point, around) in scene.bounding_points() {
+                for (point, around) in scene.framed_points() {
                     let p = in_view(point);
                     half_width = half_width.max((p.x.abs() + around) / room);
                     half_height = half_height.max((p.y.abs() + around) / room);
@@ -145,7 +168,7 @@ impl Camera {
                 world_to_view: from(distance).to_cols_array(),
                 view_to_clip: parallel(half, near, far).to_cols_array(),
             };
-            (projection * to_view, None, seen)
+            (projection * to_view, None, seen, half.map(|half| 0.5 / half))
         } else {
             let tangent_y = libm::tan(fov.to_radians() / 2.0);
             let tangent_x = tangent_y * aspect;
@@ -153,7 +176,7 @@ impl Camera {
                 Some(units) => units * radius,
                 None => {
                     let mut distance = 0.0_f64;
-                    for (point, around) in scene.bounding_points() {
+                    for (point, around) in scene.framed_points() {
                         let p = in_view(point);
                         let fit = |offset: f64, tangent: f64| {
                             let tangent = tangent * room;
@@ -163,7 +186,7 @@ impl Camera {
                         };
                         distance = distance.max(fit(p.x, tangent_x)).max(fit(p.y, tangent_y));
                     }
-                    distance.max(nearest + slack)
+                    distance.max(framed + slack)
                 }
             };
             let far = distance - furthest;
@@ -173,7 +196,8 @@ impl Camera {
                     "move it away with --distance",
                 ));
             }
-            let near = (distance - nearest).max(far * NEAREST);
+            let least = if scene.has_splats() { NEAREST_AMONG } else { NEAREST };
+            let near = (distance - nearest).max(far * least);
             let projection = DMat4::from_cols(
                 DVec4::new(1.0 / tangent_x, 0.0, 0.0, 0.0),
                 DVec4::new(0.0, 1.0 / tangent_y, 0.0, 0.0),
@@ -188,7 +212,13 @@ impl Camera {
                 world_to_view: from(distance).to_cols_array(),
                 view_to_clip: projection.to_cols_array(),
             };
-            (projection * retreat * to_view, Some(centre + back * distance), seen)
+            let focal = [tangent_x, tangent_y].map(|tangent| 0.5 / tangent);
+            (projection * retreat * to_view, Some(centre + back * distance), seen, focal)
+        };
+        let size = [f64::from(width), f64::from(height)];
+        let range = match eye {
+            Some(_) => [seen.near, seen.far],
+            None => [-nearest, -furthest],
         };
         let lens = match (fov, options.distance) {
             (0.0, _) => "parallel lines".to_string(),
@@ -201,7 +231,11 @@ impl Camera {
             up,
             back,
             eye,
-            size: [f64::from(width), f64::from(height)],
+            size,
+            focal: [0, 1].map(|i| focal[i] * size[i]),
+            principal: size.map(|side| side / 2.0),
+            origin: eye.unwrap_or(centre),
+            range,
             view: seen,
             description: format!("angle {yaw},{pitch}, {lens}"),
         })
@@ -216,6 +250,31 @@ impl Camera {
     /// far away that double precision does not tell its planes and axes well enough.
     pub fn view(&self) -> Option<View> {
         self.view.check().is_ok().then_some(self.view)
+    }
+
+    /// A point as the camera sees it: to the right, downwards, and along the view axis.
+    pub(crate) fn seen(&self, point: DVec3) -> DVec3 {
+        self.to_axes() * (point - self.origin)
+    }
+
+    /// Turns directions of the scene's space into right, down and forward.
+    pub(crate) fn to_axes(&self) -> DMat3 {
+        DMat3::from_cols(self.right, -self.up, -self.back).transpose()
+    }
+
+    /// The depth at a distance along the view axis: 0 on the near plane, 1 on the far one;
+    /// below 0 before the near one.
+    pub(crate) fn depth(&self, distance: f64) -> f64 {
+        let [near, far] = self.range;
+        let share = (distance - near) / (far - near);
+        if self.eye.is_some() { share * far / distance } else { share }
+    }
+
+    /// By how much [`Camera::depth`] changes with one divided by the distance; where lines of
+    /// sight are parallel, with the distance.
+    pub(crate) fn depth_slope(&self) -> f64 {
+        let [near, far] = self.range;
+        if self.eye.is_some() { -near * far / (far - near) } else { 1.0 / (far - near) }
     }
 
     /// Unit vector from `point` towards the camera.
@@ -261,7 +320,7 @@ mod tests {
                     let options = CameraOptions {
                         angle: Some(angle),
                         field_of_view: Some(fov),
-                        distance: None,
+                        ..CameraOptions::default()
                     };
                     let scene = cube();
                     let camera = Camera::frame(&scene, &options, width, height).unwrap();
@@ -282,8 +341,12 @@ mod tests {
     fn what_is_recorded_is_what_is_drawn() {
         for fov in [0.0, 10.0, 60.0, 120.0] {
             for (angle, distance) in [([0.0, 0.0], None), ([30.0, 20.0], Some(3.0))] {
-                let options =
-                    CameraOptions { angle: Some(angle), field_of_view: Some(fov), distance };
+                let options = CameraOptions {
+                    angle: Some(angle),
+                    field_of_view: Some(fov),
+                    distance,
+                    pose: None,
+                };
                 let scene = cube();
                 let camera = Camera::frame(&scene, &options, 320, 100).unwrap();
                 let view = camera.view().unwrap();

@@ -2,11 +2,13 @@
 
 use glam::{DVec3, DVec4};
 
-use crate::capture::geometry::Geometry;
+use crate::capture::geometry::{Geometry, Primitive, Triangle};
 use crate::capture::raster::{Raster, Weights};
 use crate::capture::setup::STEPS;
+use crate::capture::setup::ScreenTriangle;
 use crate::capture::shade::Shader;
-use crate::capture::{Capture, Drawn, order};
+use crate::capture::{Capture, order};
+use screendoor_trace::error::{Error, Result};
 use screendoor_trace::trace::{DepthPlane, Fragment, SampleMask, SamplePattern};
 
 /// A capture's triangles in drawing order, for another rasteriser to draw.
@@ -20,19 +22,29 @@ pub struct Drawing<'a> {
 /// A triangle of a [`Drawing`], set up on our grid.
 pub struct SetUp<'a> {
     drawing: &'a Drawing<'a>,
-    drawn: Drawn,
+    triangle: Triangle,
+    /// What clipping left of it.
+    pieces: Vec<ScreenTriangle>,
     /// The samples' places in sub-pixel steps from the pixel's centre.
     offsets: Vec<[i64; 2]>,
 }
 
 impl Capture<'_> {
     /// What it draws, for another rasteriser.
-    pub fn drawing(&self) -> Drawing<'_> {
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] for a scene with splats, which are no triangles.
+    pub fn drawing(&self) -> Result<Drawing<'_>> {
+        if self.scene.has_splats() {
+            let hint = "leave --gpu out";
+            let what = "Gaussian splats are drawn by our own rasteriser alone";
+            return Err(Error::unsupported(&self.scene.source, what, hint));
+        }
         let geometry = Geometry::new(self.scene, &self.camera);
         let (kind, seed) = (self.options.order, self.options.order_seed);
         let order = order::drawing_order(kind, seed, &geometry, &self.camera);
-        let shader = Shader::new(self.scene, &self.camera, self.options.alpha);
-        Drawing { capture: self, geometry, shader, order }
+        let shader = self.shader();
+        Ok(Drawing { capture: self, geometry, shader, order })
     }
 
     /// Says that samples lie where `pattern` has them, and who found the coverage.
@@ -56,7 +68,7 @@ impl Drawing<'_> {
     /// The corners of the `i`-th triangle in clip space, and whether it is drawn where it
     /// shows its back.
     pub fn corners(&self, i: usize) -> ([DVec4; 3], bool) {
-        let triangle = self.geometry.triangle(self.number(i));
+        let triangle = self.triangle(i);
         let to_clip = self.capture.camera.to_clip;
         let corners = triangle.vertices.map(|v| to_clip * v.position.extend(1.0));
         (corners, self.capture.keeps_back(&triangle, &self.shader))
@@ -64,9 +76,17 @@ impl Drawing<'_> {
 
     /// The `i`-th triangle on our own grid, for samples at `positions`.
     pub fn set_up(&self, i: usize, positions: &[[i8; 2]]) -> SetUp<'_> {
-        let drawn = self.capture.prepare(self.geometry.triangle(self.number(i)), &self.shader);
+        let triangle = self.triangle(i);
+        let pieces = self.capture.set_up(&triangle, &self.shader);
         let offsets = positions.iter().map(|p| p.map(|v| i64::from(v) * STEPS / 16)).collect();
-        SetUp { drawing: self, drawn, offsets }
+        SetUp { drawing: self, triangle, pieces, offsets }
+    }
+
+    fn triangle(&self, i: usize) -> Triangle {
+        match self.geometry.primitive(self.number(i)) {
+            Primitive::Triangle(triangle) => triangle,
+            Primitive::Splat(_) => unreachable!("a scene with splats has no such drawing"),
+        }
     }
 }
 
@@ -74,18 +94,18 @@ impl SetUp<'_> {
     fn rasters(&self) -> impl Iterator<Item = Raster<'_>> {
         let options = self.drawing.capture.options;
         let size = [options.width, options.height];
-        self.drawn.pieces.iter().map(move |piece| Raster::new(piece, &self.offsets, size))
+        self.pieces.iter().map(move |piece| Raster::new(piece, &self.offsets, size))
     }
 
     /// Whether nothing is left of it on our grid.
     pub fn is_empty(&self) -> bool {
-        self.drawn.pieces.is_empty()
+        self.pieces.is_empty()
     }
 
     /// Whether clipping has cut it.
     pub fn is_clipped(&self) -> bool {
         let corner = |w: &DVec3| w.max_element() == 1.0;
-        !self.drawn.pieces.iter().all(|piece| piece.weights.iter().all(corner))
+        !self.pieces.iter().all(|piece| piece.weights.iter().all(corner))
     }
 
     /// The fragment of pixel `[x, y]` where the triangle covers `coverage` there. `depth` is
@@ -110,7 +130,7 @@ impl SetUp<'_> {
             }
             None => (depth, Weights { at: [1.0 / 3.0; 3], dx: [0.0; 3], dy: [0.0; 3] }),
         };
-        let Drawn { triangle, .. } = &self.drawn;
+        let triangle = &self.triangle;
         let (colour, alpha) = self.drawing.shader.shade(triangle, &weights)?;
         let (primitive, object) = (triangle.primitive, triangle.object);
         Some(Fragment {

@@ -1,9 +1,9 @@
-//! The scene as a list of triangles, each made when it is asked for.
+//! The scene as a list of triangles and splats, each made when it is asked for.
 
 use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3, Vec4};
 
 use crate::capture::camera::Camera;
-use crate::scene::{Mesh, Particles, Scene, Shape, Strands};
+use crate::scene::{Mesh, Particles, Scene, Shape, Splats, Strands};
 
 /// A vertex as the rasteriser and the shader need it.
 #[derive(Clone, Copy, Debug)]
@@ -26,11 +26,28 @@ pub(crate) struct Triangle {
     pub primitive: u32,
 }
 
-/// The scene's triangles, numbered through in API order.
+/// A splat of the scene.
+#[derive(Clone, Copy)]
+pub(crate) struct Splat<'a> {
+    pub splats: &'a Splats,
+    /// Which of them.
+    pub index: usize,
+    pub object: u32,
+    pub primitive: u32,
+}
+
+/// What is drawn at a time.
+#[expect(clippy::large_enum_variant, reason = "there is one at a time")]
+pub(crate) enum Primitive<'a> {
+    Triangle(Triangle),
+    Splat(Splat<'a>),
+}
+
+/// The scene's triangles and splats, numbered through in API order.
 pub(crate) struct Geometry<'a> {
     scene: &'a Scene,
     camera: &'a Camera,
-    /// The number of each object's first triangle, and at the end the total.
+    /// The number of each object's first primitive, and at the end the total.
     starts: Vec<u32>,
     places: Vec<Placement>,
 }
@@ -39,26 +56,26 @@ impl<'a> Geometry<'a> {
     pub(super) fn new(scene: &'a Scene, camera: &'a Camera) -> Self {
         let mut starts = vec![0];
         for object in &scene.objects {
-            // Scenes with more than 2^32 triangles are refused on loading.
-            let count = scene.shapes[object.shape].triangle_count() as u32;
+            // Scenes with more than 2^32 of them are refused on loading.
+            let count = scene.shapes[object.shape].primitive_count() as u32;
             starts.push(starts.last().expect("never empty") + count);
         }
         let places = scene.objects.iter().map(|o| Placement::new(o.place)).collect();
         Geometry { scene, camera, starts, places }
     }
 
-    /// How many triangles there are.
+    /// How many primitives there are.
     pub(super) fn len(&self) -> u32 {
         *self.starts.last().expect("never empty")
     }
 
-    /// The triangles of an object.
+    /// The primitives of an object.
     pub(super) fn of_object(&self, object: usize) -> std::ops::Range<u32> {
         self.starts[object]..self.starts[object + 1]
     }
 
-    /// Triangle `primitive`.
-    pub(super) fn triangle(&self, primitive: u32) -> Triangle {
+    /// Primitive `primitive`.
+    pub(super) fn primitive(&self, primitive: u32) -> Primitive<'a> {
         let index = self.starts.partition_point(|start| *start <= primitive) - 1;
         let object = &self.scene.objects[index];
         let local = primitive - self.starts[index];
@@ -69,8 +86,27 @@ impl<'a> Geometry<'a> {
             Shape::Particles(particles) => {
                 particle_triangle(particles, local, &object.place, self.camera)
             }
+            Shape::Splats(splats) => {
+                let (index, object) = (local as usize, index as u32);
+                return Primitive::Splat(Splat { splats, index, object, primitive });
+            }
         };
-        Triangle { vertices, material: shape.material(), object: index as u32, primitive }
+        let (material, object) = (shape.material(), index as u32);
+        Primitive::Triangle(Triangle { vertices, material, object, primitive })
+    }
+
+    /// The middle of a primitive.
+    pub(super) fn middle(&self, primitive: u32) -> DVec3 {
+        match self.primitive(primitive) {
+            Primitive::Triangle(triangle) => {
+                let [a, b, c] = triangle.vertices.map(|v| v.position);
+                (a + b + c) / 3.0
+            }
+            Primitive::Splat(Splat { splats, index, object, .. }) => {
+                let place = &self.scene.objects[object as usize].place;
+                place.transform_point3(splats.means[index].as_dvec3())
+            }
+        }
     }
 }
 

@@ -14,25 +14,29 @@ mod pattern;
 mod raster;
 mod setup;
 mod shade;
+mod splat;
 mod unseen;
 
 use std::io::Write;
 
 use rayon::prelude::*;
 
-pub use camera::{Camera, CameraOptions};
+pub use camera::{Camera, CameraOptions, Pose, Poses};
 pub use covered::{Drawing, SetUp};
 pub use order::Order;
 pub use pattern::{PatternKind, pattern};
+pub use splat::{OnFrame as SplatOnFrame, PARAMS as SPLAT_PARAMS, RULE_SETS, RuleSet, SplatRules};
 pub use unseen::Unseen;
 
-use crate::capture::geometry::{Geometry, Triangle};
+use crate::capture::geometry::{Geometry, Primitive, Triangle};
 use crate::capture::raster::Raster;
 use crate::capture::setup::{STEPS, ScreenTriangle, set_up};
 use crate::capture::shade::Shader;
+use crate::capture::splat::{Nothing, Painter, Placed};
 use crate::capture::unseen::Recorded;
 use crate::scene::Scene;
 use screendoor_trace::error::{Error, Result};
+use screendoor_trace::picture::Space;
 use screendoor_trace::trace::{
     ColourFormat, ColumnId, Fragment, Header, Scalar, Trace, TraceWriter, WriteOptions,
 };
@@ -59,7 +63,7 @@ pub struct CaptureOptions {
     pub pattern: PatternKind,
     /// An alpha in place of the materials' own; texture alphas still multiply it.
     pub alpha: Option<f32>,
-    /// The order in which triangles are drawn.
+    /// The order in which triangles and splats are drawn.
     pub order: Order,
     /// Which shuffle a random order takes.
     pub order_seed: u32,
@@ -71,6 +75,10 @@ pub struct CaptureOptions {
     pub background: Option<[f32; 3]>,
     /// From where to look.
     pub camera: CameraOptions,
+    /// How splats are drawn.
+    pub splats: SplatRules,
+    /// What the trace's colours stand for; where not given, encoded for splats and else linear.
+    pub space: Option<Space>,
 }
 
 impl Default for CaptureOptions {
@@ -87,6 +95,8 @@ impl Default for CaptureOptions {
             colour: ColourFormat::F16,
             background: None,
             camera: CameraOptions::default(),
+            splats: SplatRules::default(),
+            space: None,
         }
     }
 }
@@ -100,7 +110,7 @@ pub struct Capture<'a> {
     recorded: Recorded,
 }
 
-/// Triangles set up at a time.
+/// Triangles and splats set up at a time.
 const CHUNK: usize = 1 << 14;
 /// Pixels of bounding boxes that one job rasterises.
 const JOB_PIXELS: i64 = 1 << 13;
@@ -116,12 +126,15 @@ impl<'a> Capture<'a> {
         if options.alpha.is_some_and(|a| !(0.0..=1.0).contains(&a)) {
             return Err(Error::config("an alpha lies in [0, 1]", "give --alpha such a number"));
         }
+        let space = space(scene, options)?;
         let camera = Camera::frame(scene, &options.camera, options.width, options.height)?;
+        let background = options.background.unwrap_or(scene.view.background);
         let mut header = Header {
             width: options.width,
             height: options.height,
             pattern: pattern(options.pattern, options.samples)?,
-            background: options.background.unwrap_or(scene.view.background),
+            background: background.map(|c| space.of_linear(f64::from(c)) as f32),
+            space,
             colour: options.colour,
             source: scene.source.clone(),
             camera: camera.description().to_string(),
@@ -140,10 +153,13 @@ impl<'a> Capture<'a> {
             Order::NearToFar => header.source.push_str(", near to far"),
             Order::FarToNear => header.source.push_str(", far to near"),
         }
+        if scene.has_splats() {
+            header.source.push_str(&format!(", splats by {}", options.splats.spec()));
+        }
         if scene.objects.len() == 1 {
             header.constants.insert(ColumnId::Object, Scalar::Unsigned(0));
         }
-        if let Some(alpha) = Shader::new(scene, &camera, options.alpha).constant_alpha() {
+        if let Some(alpha) = Shader::new(scene, &camera, options.alpha, space).constant_alpha() {
             header.constants.insert(ColumnId::Alpha, Scalar::Real(alpha));
         }
         let recorded = Recorded::new(scene.objects.len());
@@ -156,7 +172,7 @@ impl<'a> Capture<'a> {
     }
 
     /// Draws the scene into `writer`, which was made with [`Capture::header`].
-    /// `progress` is told how many triangles are done, of how many.
+    /// `progress` is told how many triangles and splats are done, of how many.
     ///
     /// # Errors
     /// As [`TraceWriter::push`].
@@ -166,25 +182,21 @@ impl<'a> Capture<'a> {
         mut progress: impl FnMut(u64, u64) + Send,
     ) -> Result<()> {
         let geometry = Geometry::new(self.scene, &self.camera);
-        let shader = Shader::new(self.scene, &self.camera, self.options.alpha);
-        let samples = &self.header.pattern.positions;
-        let offsets: Vec<[i64; 2]> =
-            samples.iter().map(|p| p.map(|v| i64::from(v) * STEPS / 16)).collect();
+        let tools = self.tools();
         let seed = self.options.order_seed;
         let order = order::drawing_order(self.options.order, seed, &geometry, &self.camera);
         let total = geometry.len() as usize;
         let number = |i: usize| order.as_ref().map_or(i as u32, |order| order[i]);
 
-        let size = [self.options.width, self.options.height];
         // What the previous wave made, written while this one is drawn.
         let mut finished: Vec<Vec<Fragment>> = Vec::new();
         for start in (0..total).step_by(CHUNK) {
             let end = (start + CHUNK).min(total);
             let drawn: Vec<Drawn> = (start..end)
                 .into_par_iter()
-                .map(|i| self.prepare(geometry.triangle(number(i)), &shader))
+                .map(|i| self.prepare(geometry.primitive(number(i)), &tools))
                 .collect();
-            let jobs = cut_into_jobs(&drawn, &offsets, size);
+            let jobs = cut_into_jobs(&drawn, &tools);
             let mut rest = &jobs[..];
             while !rest.is_empty() {
                 let (wave, later) = rest.split_at(wave_length(rest));
@@ -194,7 +206,7 @@ impl<'a> Capture<'a> {
                     || self.write_all(writer, std::mem::take(&mut finished)),
                     || {
                         wave.par_iter()
-                            .map(|job| job.run(&drawn, &offsets, size, &shader))
+                            .map(|job| job.run(&drawn, &tools))
                             .collect_into_vec(&mut done);
                     },
                 );
@@ -204,6 +216,16 @@ impl<'a> Capture<'a> {
             progress(end as u64, total as u64);
         }
         self.write_all(writer, finished)
+    }
+
+    /// The splats that are drawn, on the frame or outside of it, with their numbers.
+    pub fn splats_on_frame(&self) -> Vec<(u32, SplatOnFrame)> {
+        let (geometry, tools) = (Geometry::new(self.scene, &self.camera), self.tools());
+        let on_frame = |number: u32| match geometry.primitive(number) {
+            Primitive::Triangle(_) => None,
+            Primitive::Splat(splat) => Some((number, tools.project(&splat).ok()?)),
+        };
+        (0..geometry.len()).into_par_iter().filter_map(on_frame).collect()
     }
 
     /// Draws the scene into a trace in memory.
@@ -241,18 +263,161 @@ impl<'a> Capture<'a> {
         writer.push(fragment)
     }
 
-    fn prepare(&self, triangle: Triangle, shader: &Shader<'_>) -> Drawn {
-        let keep_back = self.keeps_back(&triangle, shader);
+    /// What clipping leaves of a triangle.
+    fn set_up(&self, triangle: &Triangle, shader: &Shader<'_>) -> Vec<ScreenTriangle> {
         let mut pieces = Vec::new();
-        set_up(&triangle, &self.camera, keep_back, &mut pieces);
-        Drawn { triangle, pieces }
+        set_up(triangle, &self.camera, self.keeps_back(triangle, shader), &mut pieces);
+        pieces
+    }
+
+    fn prepare(&self, primitive: Primitive<'_>, tools: &Tools<'_>) -> Drawn {
+        match primitive {
+            Primitive::Triangle(triangle) => {
+                let pieces = self.set_up(&triangle, &tools.shader);
+                Drawn::Triangle { triangle, pieces }
+            }
+            Primitive::Splat(splat) => {
+                let on_frame = tools.project(&splat);
+                let (object, primitive) = (splat.object, splat.primitive);
+                Drawn::Splat { on_frame, object, primitive }
+            }
+        }
+    }
+
+    fn shader(&self) -> Shader<'_> {
+        Shader::new(self.scene, &self.camera, self.options.alpha, self.header.space)
+    }
+
+    fn tools(&self) -> Tools<'_> {
+        let (rules, space) = (&self.options.splats, self.header.space);
+        let painter = Painter::new(&self.camera, rules, space, self.options.alpha);
+        let placed = self.scene.objects.iter().map(|o| painter.placed(o.place)).collect();
+        let positions = &self.header.pattern.positions;
+        Tools {
+            shader: self.shader(),
+            painter,
+            placed,
+            rules,
+            steps: positions.iter().map(|p| p.map(|v| i64::from(v) * STEPS / 16)).collect(),
+            pixels: positions.iter().map(|p| p.map(|v| f64::from(v) / 16.0)).collect(),
+            size: [self.options.width, self.options.height],
+        }
     }
 }
 
-/// A triangle and what clipping left of it.
-struct Drawn {
-    triangle: Triangle,
-    pieces: Vec<ScreenTriangle>,
+/// What the trace's colours stand for.
+fn space(scene: &Scene, options: &CaptureOptions) -> Result<Space> {
+    let own = |space| scene.shapes.iter().any(|shape| shape.space() == space);
+    match options.space {
+        Some(space) => Ok(space),
+        None if own(Space::Encoded) && own(Space::Linear) => Err(Error::unsupported(
+            &scene.source,
+            "it has splats, which are trained to be blended as encoded, and shapes that are \
+             blended in linear light",
+            "say with --space which of both all of it is blended in",
+        )),
+        None if own(Space::Encoded) => Ok(Space::Encoded),
+        None => Ok(Space::Linear),
+    }
+}
+
+/// What a capture draws with.
+struct Tools<'a> {
+    shader: Shader<'a>,
+    painter: Painter<'a>,
+    /// Each object's place, for its splats.
+    placed: Vec<Placed>,
+    rules: &'a SplatRules,
+    /// The samples' places from the pixel's centre, in sub-pixel steps and in pixels.
+    steps: Vec<[i64; 2]>,
+    pixels: Vec<[f64; 2]>,
+    /// The frame's, in pixels.
+    size: [u32; 2],
+}
+
+impl Tools<'_> {
+    fn project(&self, splat: &geometry::Splat<'_>) -> std::result::Result<SplatOnFrame, Nothing> {
+        self.painter.project(splat.splats, splat.index, &self.placed[splat.object as usize])
+    }
+
+    fn raster<'p>(&'p self, piece: &'p ScreenTriangle) -> Raster<'p> {
+        Raster::new(piece, &self.steps, self.size)
+    }
+}
+
+/// A primitive and what is left of it on the frame.
+enum Drawn {
+    Triangle {
+        triangle: Triangle,
+        /// What clipping left of it.
+        pieces: Vec<ScreenTriangle>,
+    },
+    Splat {
+        on_frame: std::result::Result<SplatOnFrame, Nothing>,
+        object: u32,
+        primitive: u32,
+    },
+}
+
+/// The rows that something may touch, empty where they cross, and the pixels of each.
+struct Extent {
+    rows: (i64, i64),
+    columns: i64,
+}
+
+impl Drawn {
+    /// The extent of each piece.
+    fn extents(&self, tools: &Tools<'_>) -> Vec<Extent> {
+        match self {
+            Drawn::Triangle { pieces, .. } => {
+                let extent = |piece| {
+                    let raster = tools.raster(piece);
+                    Extent { rows: raster.rows(), columns: raster.columns() }
+                };
+                pieces.iter().map(extent).collect()
+            }
+            Drawn::Splat { on_frame, .. } => {
+                let extent = |s: &SplatOnFrame| Extent { rows: s.rows(), columns: s.columns() };
+                on_frame.iter().map(extent).collect()
+            }
+        }
+    }
+
+    /// Its fragments in some rows of a piece.
+    fn fragments(&self, part: &Part, tools: &Tools<'_>, fragments: &mut Vec<Fragment>) {
+        match self {
+            Drawn::Triangle { triangle, pieces } => {
+                let raster = tools.raster(&pieces[part.piece]);
+                for y in part.rows.0..=part.rows.1 {
+                    raster.row(y, |hit| {
+                        let weights = raster.weights(hit.shade_at);
+                        let shaded = tools.shader.shade(triangle, &weights);
+                        let Some((colour, alpha)) = shaded else { return };
+                        fragments.push(Fragment {
+                            x: hit.x,
+                            y: hit.y,
+                            coverage: hit.coverage,
+                            depth: hit.depth,
+                            colour,
+                            alpha,
+                            primitive: triangle.primitive,
+                            object: triangle.object,
+                            ..Fragment::default()
+                        });
+                    });
+                }
+            }
+            Drawn::Splat { on_frame, object, primitive } => {
+                let Ok(splat) = on_frame else { return };
+                let (object, primitive) = (*object, *primitive);
+                let of = Fragment { object, primitive, ..Fragment::default() };
+                for y in part.rows.0..=part.rows.1 {
+                    let push = |fragment| fragments.push(fragment);
+                    splat.row(y, tools.rules, &tools.pixels, of, push);
+                }
+            }
+        }
+    }
 }
 
 /// A part of the drawing that one thread does: some rows of one piece after the
@@ -263,7 +428,7 @@ struct Job {
     pixels: i64,
 }
 
-/// Rows of a piece of a triangle, by their places in the chunk.
+/// Rows of a piece of a primitive, by their places in the chunk.
 struct Part {
     drawn: usize,
     piece: usize,
@@ -271,14 +436,13 @@ struct Part {
 }
 
 /// Cuts the drawing of a chunk into jobs of about equal size, in drawing order.
-/// The cuts depend on the triangles alone, not on the threads.
-fn cut_into_jobs(drawn: &[Drawn], offsets: &[[i64; 2]], size: [u32; 2]) -> Vec<Job> {
+/// The cuts depend on the primitives alone, not on the threads.
+fn cut_into_jobs(drawn: &[Drawn], tools: &Tools<'_>) -> Vec<Job> {
     let mut jobs = vec![Job::default()];
     for (i, d) in drawn.iter().enumerate() {
-        for (k, piece) in d.pieces.iter().enumerate() {
-            let raster = Raster::new(piece, offsets, size);
-            let (mut row, last) = raster.rows();
-            let columns = raster.columns();
+        for (k, extent) in d.extents(tools).into_iter().enumerate() {
+            let (mut row, last) = extent.rows;
+            let columns = extent.columns;
             while row <= last {
                 let mut job = jobs.last_mut().expect("never empty");
                 if job.pixels >= JOB_PIXELS {
@@ -307,35 +471,9 @@ fn wave_length(jobs: &[Job]) -> usize {
 }
 
 impl Job {
-    fn run(
-        &self,
-        drawn: &[Drawn],
-        offsets: &[[i64; 2]],
-        size: [u32; 2],
-        shader: &Shader<'_>,
-    ) -> Vec<Fragment> {
+    fn run(&self, drawn: &[Drawn], tools: &Tools<'_>) -> Vec<Fragment> {
         let mut fragments = Vec::new();
-        for part in &self.parts {
-            let Drawn { triangle, pieces } = &drawn[part.drawn];
-            let raster = Raster::new(&pieces[part.piece], offsets, size);
-            for y in part.rows.0..=part.rows.1 {
-                raster.row(y, |hit| {
-                    let weights = raster.weights(hit.shade_at);
-                    let Some((colour, alpha)) = shader.shade(triangle, &weights) else { return };
-                    fragments.push(Fragment {
-                        x: hit.x,
-                        y: hit.y,
-                        coverage: hit.coverage,
-                        depth: hit.depth,
-                        colour,
-                        alpha,
-                        primitive: triangle.primitive,
-                        object: triangle.object,
-                        ..Fragment::default()
-                    });
-                });
-            }
-        }
+        self.parts.iter().for_each(|part| drawn[part.drawn].fragments(part, tools, &mut fragments));
         fragments
     }
 }

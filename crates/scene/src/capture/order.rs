@@ -1,4 +1,4 @@
-//! The order in which triangles are drawn.
+//! The order in which triangles and splats are drawn.
 
 use rayon::prelude::*;
 
@@ -7,7 +7,7 @@ use crate::capture::geometry::Geometry;
 use screendoor_trace::random::Stream;
 
 screendoor_trace::options! {
-    /// The order in which triangles are drawn.
+    /// The order in which triangles and splats are drawn.
     pub enum Order {
         Api = "api": "as the scene lists them",
         Random = "random": "shuffled, by --order-seed",
@@ -16,7 +16,7 @@ screendoor_trace::options! {
     }
 }
 
-/// The triangles' numbers in drawing order; `None` is 0, 1, 2, ….
+/// The primitives' numbers in drawing order; `None` is 0, 1, 2, ….
 pub(crate) fn drawing_order(
     order: Order,
     seed: u32,
@@ -35,8 +35,7 @@ pub(crate) fn drawing_order(
             let mut keyed: Vec<(f64, u32)> = all
                 .into_par_iter()
                 .map(|i| {
-                    let [a, b, c] = geometry.triangle(i).vertices.map(|v| v.position);
-                    let centre = (a + b + c) / 3.0;
+                    let centre = geometry.middle(i);
                     let distance = match camera.eye {
                         Some(eye) => (centre - eye).length(),
                         None => -camera.back.dot(centre),

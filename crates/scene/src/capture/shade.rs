@@ -6,6 +6,7 @@ use crate::capture::camera::Camera;
 use crate::capture::geometry::Triangle;
 use crate::capture::raster::Weights;
 use crate::scene::{AlphaMode, Material, Scene, TextureUse};
+use screendoor_trace::picture::Space;
 
 /// Light: a directional one that moves with the camera, a weaker one from the
 /// other side, and a little from everywhere.
@@ -27,18 +28,25 @@ pub(crate) struct Shader<'a> {
     key: Vec3,
     fill: Vec3,
     alpha: Option<f32>,
+    /// What the trace's colours stand for.
+    space: Space,
 }
 
 impl<'a> Shader<'a> {
     /// `alpha`, where given, replaces the materials' own; texture alphas still
     /// multiply it.
-    pub(super) fn new(scene: &'a Scene, camera: &'a Camera, alpha: Option<f32>) -> Self {
+    pub(super) fn new(
+        scene: &'a Scene,
+        camera: &'a Camera,
+        alpha: Option<f32>,
+        space: Space,
+    ) -> Self {
         let turn = |light: Vec3| {
             let l = light.as_dvec3();
             let turned = camera.right * l.x + camera.up * l.y + camera.back * l.z;
             turned.normalize_or(DVec3::Z).as_vec3()
         };
-        Shader { scene, camera, key: turn(KEY), fill: turn(FILL), alpha }
+        Shader { scene, camera, key: turn(KEY), fill: turn(FILL), alpha, space }
     }
 
     /// Whether the back of a surface of `material` is drawn.
@@ -52,6 +60,7 @@ impl<'a> Shader<'a> {
         for shape in &self.scene.shapes {
             let material = self.material(shape.material());
             let vertex_alpha = match shape {
+                crate::scene::Shape::Splats(_) => return None,
                 crate::scene::Shape::Mesh(m) => &m.colours,
                 crate::scene::Shape::Strands(s) => &s.colours,
                 crate::scene::Shape::Particles(p) => &p.colours,
@@ -80,7 +89,7 @@ impl<'a> Shader<'a> {
         common
     }
 
-    /// Linear colour and alpha of a fragment of `triangle` where its vertices
+    /// Colour and alpha of a fragment of `triangle` where its vertices
     /// have these weights; `None` where there is nothing: an alpha of 0 or next to
     /// it, or cut out by a mask.
     pub(super) fn shade(&self, triangle: &Triangle, weights: &Weights) -> Option<([f32; 3], f32)> {
@@ -135,8 +144,12 @@ impl<'a> Shader<'a> {
         let glow = material.emissive_texture.map_or(Vec3::ONE, |t| texel(t).truncate());
         colour += material.emissive * glow;
         // Negative light is no colour; beyond half precision there is no need to go.
-        let colour = colour.clamp(Vec3::ZERO, Vec3::splat(65504.0));
-        Some((colour.to_array(), alpha))
+        let colour = colour.clamp(Vec3::ZERO, Vec3::splat(65504.0)).to_array();
+        let colour = match self.space {
+            Space::Linear => colour,
+            space => colour.map(|c| space.of_linear(f64::from(c)) as f32),
+        };
+        Some((colour, alpha))
     }
 
     /// The light that a diffuse surface reflects towards the camera, per unit of

@@ -7,12 +7,12 @@ use glam::DVec3;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::capture::geometry::{Geometry, Triangle};
-use crate::capture::raster::Raster;
-use crate::capture::setup::{STEPS, set_up};
-use crate::capture::shade::{LEAST_ALPHA, Shader};
-use crate::capture::{Capture, Drawn};
-use crate::scene::{AlphaMode, Material};
+use crate::capture::geometry::{Geometry, Primitive, Splat, Triangle};
+use crate::capture::setup::set_up;
+use crate::capture::shade::LEAST_ALPHA;
+use crate::capture::splat::Nothing;
+use crate::capture::{Capture, Tools};
+use crate::scene::{AlphaMode, Material, Shape};
 
 /// An object of which no fragment was recorded.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -21,8 +21,8 @@ pub struct Unseen {
     pub object: u32,
     /// Its name.
     pub name: String,
-    /// How many triangles it has.
-    pub triangles: u64,
+    /// How many triangles or splats it has.
+    pub primitives: u64,
     /// Why nothing of them is there.
     pub reason: String,
 }
@@ -52,7 +52,7 @@ impl Recorded {
     }
 }
 
-/// Why nothing of a triangle is there.
+/// Why nothing of a primitive is there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Reason {
     Transparent,
@@ -63,7 +63,7 @@ enum Reason {
     Thin,
 }
 
-/// All of them, with what is said of triangles.
+/// All of them, with what is said of primitives.
 const REASONS: [(Reason, &str); 6] = [
     (Reason::Transparent, "wholly transparent"),
     (Reason::Outside, "outside the frame"),
@@ -77,14 +77,14 @@ impl Capture<'_> {
     /// The objects of which the drawing so far has recorded no fragment, in their order.
     pub fn unseen(&self) -> Vec<Unseen> {
         let geometry = Geometry::new(self.scene, &self.camera);
-        let shader = Shader::new(self.scene, &self.camera, self.options.alpha);
-        let samples = &self.header.pattern.positions;
-        let offsets: Vec<[i64; 2]> =
-            samples.iter().map(|p| p.map(|v| i64::from(v) * STEPS / 16)).collect();
+        let tools = self.tools();
         let unseen = |object: usize| {
             let range = geometry.of_object(object);
-            let count = |counts: [u64; REASONS.len()], triangle: u32| {
-                let reason = self.reason(geometry.triangle(triangle), &shader, &offsets);
+            let count = |counts: [u64; REASONS.len()], primitive: u32| {
+                let reason = match geometry.primitive(primitive) {
+                    Primitive::Triangle(triangle) => self.reason(&triangle, &tools),
+                    Primitive::Splat(splat) => reason_of_splat(&splat, &tools),
+                };
                 let mut counts = counts;
                 counts[reason as usize] += 1;
                 counts
@@ -98,36 +98,40 @@ impl Capture<'_> {
                 .fold(Default::default, count)
                 .reduce(Default::default, add);
             let placed = &self.scene.objects[object];
-            let material = shader.material(self.scene.shapes[placed.shape].material());
+            let shape = &self.scene.shapes[placed.shape];
+            let (noun, transparent) = match shape {
+                Shape::Splats(_) => ("splat", "their alphas are below what the rules draw".into()),
+                _ => ("triangle", self.why_transparent(tools.shader.material(shape.material()))),
+            };
             Unseen {
                 object: object as u32,
                 name: placed.name.clone(),
-                triangles: range.len() as u64,
-                reason: said(counts, &self.why_transparent(material)),
+                primitives: range.len() as u64,
+                reason: said(noun, counts, &transparent),
             }
         };
         self.recorded.missing().map(unseen).collect()
     }
 
     /// Why nothing of a triangle was recorded, of which nothing was.
-    fn reason(&self, triangle: Triangle, shader: &Shader<'_>, offsets: &[[i64; 2]]) -> Reason {
+    fn reason(&self, triangle: &Triangle, tools: &Tools<'_>) -> Reason {
         let [a, b, c] = triangle.vertices.map(|v| v.position);
         if (b - a).cross(c - a) == DVec3::ZERO {
             return Reason::NoArea;
         }
-        let Drawn { triangle, pieces } = self.prepare(triangle, shader);
+        let pieces = self.set_up(triangle, &tools.shader);
         if pieces.is_empty() {
             let depth = |p: DVec3| (self.camera.to_clip * p.extend(1.0)).z;
             if [a, b, c].into_iter().all(|p| depth(p) < 0.0) {
                 return Reason::Behind;
             }
             let mut whole = Vec::new();
-            set_up(&triangle, &self.camera, true, &mut whole);
+            set_up(triangle, &self.camera, true, &mut whole);
             return if whole.is_empty() { Reason::Thin } else { Reason::Back };
         }
         let mut inside = false;
         for piece in &pieces {
-            let raster = Raster::new(piece, offsets, [self.options.width, self.options.height]);
+            let raster = tools.raster(piece);
             let (first, last) = raster.rows();
             for y in first..=last {
                 inside = true;
@@ -162,8 +166,21 @@ impl Capture<'_> {
     }
 }
 
-/// How many triangles are missing for which reason.
-fn said(counts: [u64; REASONS.len()], transparent: &str) -> String {
+/// Why nothing of a splat was recorded, of which nothing was.
+fn reason_of_splat(splat: &Splat<'_>, tools: &Tools<'_>) -> Reason {
+    match tools.project(splat) {
+        Err(Nothing::Behind) => Reason::Behind,
+        Err(Nothing::Transparent) => Reason::Transparent,
+        Err(Nothing::NoArea) => Reason::NoArea,
+        Ok(on_frame) => {
+            let (first, last) = on_frame.rows();
+            if first > last { Reason::Outside } else { Reason::Thin }
+        }
+    }
+}
+
+/// How many primitives are missing for which reason.
+fn said(noun: &str, counts: [u64; REASONS.len()], transparent: &str) -> String {
     let all: u64 = counts.iter().sum();
     let mut parts: Vec<(u64, String)> = Vec::new();
     for ((reason, text), count) in REASONS.into_iter().zip(counts) {
@@ -176,12 +193,12 @@ fn said(counts: [u64; REASONS.len()], transparent: &str) -> String {
     parts.retain(|(count, _)| *count > 0);
     parts.sort_by_key(|(count, _)| std::cmp::Reverse(*count));
     match &parts[..] {
-        [] => "it has no triangles".to_string(),
-        [(1, text)] => format!("its one triangle is {text}"),
-        [(_, text)] => format!("its {all} triangles are {text}"),
+        [] => format!("it has no {noun}s"),
+        [(1, text)] => format!("its one {noun} is {text}"),
+        [(_, text)] => format!("its {all} {noun}s are {text}"),
         parts => {
             let each: Vec<String> = parts.iter().map(|(n, text)| format!("{n} {text}")).collect();
-            format!("of its {all} triangles {}", each.join(", "))
+            format!("of its {all} {noun}s {}", each.join(", "))
         }
     }
 }
@@ -217,6 +234,7 @@ mod tests {
             angle: Some([0.0, 0.0]),
             distance: Some(0.25),
             field_of_view: Some(30.0),
+            pose: None,
         };
         let options = CaptureOptions {
             width: 32,
@@ -244,11 +262,17 @@ mod tests {
     #[test]
     fn reasons_are_counted_and_listed_as_they_are_numbered() {
         assert!(REASONS.iter().enumerate().all(|(i, (reason, _))| *reason as usize == i));
-        assert_eq!(said([0; 6], ""), "it has no triangles");
-        assert_eq!(said([0, 1, 0, 0, 0, 0], ""), "its one triangle is outside the frame");
-        assert_eq!(said([2, 0, 0, 0, 0, 0], "why"), "its 2 triangles are wholly transparent (why)");
+        assert_eq!(said("triangle", [0; 6], ""), "it has no triangles");
         assert_eq!(
-            said([1, 0, 3, 0, 0, 0], "why"),
+            said("triangle", [0, 1, 0, 0, 0, 0], ""),
+            "its one triangle is outside the frame"
+        );
+        assert_eq!(
+            said("triangle", [2, 0, 0, 0, 0, 0], "why"),
+            "its 2 triangles are wholly transparent (why)"
+        );
+        assert_eq!(
+            said("triangle", [1, 0, 3, 0, 0, 0], "why"),
             "of its 4 triangles 3 behind the camera, 1 wholly transparent (why)"
         );
     }

@@ -17,6 +17,11 @@ impl<'a> Bytes<'a> {
         Bytes { place, bytes, at: 0 }
     }
 
+    /// The file, for errors.
+    pub(super) fn place(&self) -> &'a str {
+        self.place
+    }
+
     /// How many bytes come before the next.
     pub(super) fn at(&self) -> usize {
         self.at

@@ -2,20 +2,24 @@
 //! and from built-in generators.
 //!
 //! A scene knows nothing of pixels. [`load`] takes either the name of a file
-//! (OBJ, glTF, GLB, OpenVDB, TressFX, compressed Gaussian splats) or `builtin:NAME`.
+//! (OBJ, glTF, GLB, PLY, OpenVDB, TressFX, Gaussian splats) or `builtin:NAME`.
 
+mod axes;
 pub mod builtin;
 mod bytes;
+mod far;
 mod file;
 mod folder;
 mod gltf_file;
 mod image_file;
 mod material;
 mod obj_file;
+mod ply_file;
 mod polygon;
 mod sampling;
 mod source;
 mod splat_file;
+mod splats;
 mod sprite;
 mod texture;
 mod tfx_file;
@@ -27,13 +31,16 @@ use std::path::{Path, PathBuf};
 
 use glam::{DAffine3, DVec3, Mat3, Vec2, Vec3, Vec4};
 
+pub use axes::Axes;
 pub use material::{AlphaMode, Material, TextureUse};
 pub use sampling::{Filter, Sampling, Wrap};
+pub use splats::Splats;
 pub use texture::Texture;
 
 use crate::scene::folder::Folder;
 use crate::scene::source::{BUILTIN, ending, no_builtin, no_scene};
 use screendoor_trace::error::{Error, Result};
+use screendoor_trace::picture::Space;
 
 /// The most texels of all textures of a scene that were read from files: 11 bytes
 /// each when loaded.
@@ -54,6 +61,10 @@ pub struct Scene {
     pub textures: Vec<Texture>,
     /// From where it is best seen.
     pub view: View,
+    /// From the space of its file, in which cameras given beside it stand, to the scene's.
+    pub world: DAffine3,
+    /// Which way its file has up, by habit.
+    pub axes: Axes,
     /// The files that it was read from.
     pub files: Vec<PathBuf>,
     /// What could not be honoured, for the user to know.
@@ -80,15 +91,26 @@ pub enum Shape {
     Strands(Strands),
     /// Squares that face the camera, or the outlines of ellipsoids.
     Particles(Particles),
+    /// Gaussians, each of which leaves a fragment a pixel.
+    Splats(Splats),
 }
 
 impl Shape {
-    /// How many triangles it draws.
-    pub fn triangle_count(&self) -> usize {
+    /// How many triangles or splats it draws.
+    pub fn primitive_count(&self) -> usize {
         match self {
             Shape::Mesh(mesh) => mesh.triangles.len(),
             Shape::Strands(strands) => strands.segment_count() * 2,
             Shape::Particles(particles) => particles.centres.len() * 2,
+            Shape::Splats(splats) => splats.means.len(),
+        }
+    }
+
+    /// What its colours are meant to be blended as.
+    pub fn space(&self) -> Space {
+        match self {
+            Shape::Splats(splats) => splats.space,
+            _ => Space::Linear,
         }
     }
 
@@ -98,6 +120,8 @@ impl Shape {
             Shape::Mesh(mesh) => mesh.material,
             Shape::Strands(strands) => strands.material,
             Shape::Particles(particles) => particles.material,
+            // They have colours of their own.
+            Shape::Splats(_) => 0,
         }
     }
 
@@ -122,6 +146,16 @@ impl Shape {
                 };
                 Box::new(p.centres.iter().zip(&p.axes).flat_map(corners))
             }
+            Shape::Splats(splats) => Box::new(splats.bounding_points()),
+        }
+    }
+
+    /// Those of its bounding points that a camera has in its frame: all but what lies far
+    /// outside, which trained splats have a few of.
+    fn framed_points(&self) -> Box<dyn Iterator<Item = (Vec3, f32)> + '_> {
+        match self {
+            Shape::Splats(splats) => Box::new(splats.framed_points()),
+            _ => self.bounding_points(),
         }
     }
 }
@@ -226,19 +260,36 @@ impl View {
 }
 
 impl Scene {
-    /// How many triangles it draws.
-    pub fn triangle_count(&self) -> usize {
-        self.objects.iter().map(|o| self.shapes[o.shape].triangle_count()).sum()
+    /// How many triangles and splats it draws.
+    pub fn primitive_count(&self) -> usize {
+        self.objects.iter().map(|o| self.shapes[o.shape].primitive_count()).sum()
+    }
+
+    /// Whether it has splats.
+    pub fn has_splats(&self) -> bool {
+        self.shapes.iter().any(|shape| matches!(shape, Shape::Splats(_)))
     }
 
     /// All points that bound the scene, each with a radius around it.
     pub fn bounding_points(&self) -> impl Iterator<Item = (DVec3, f64)> + '_ {
-        self.objects.iter().flat_map(|object| {
+        self.placed_points(Shape::bounding_points)
+    }
+
+    /// Those of them that a camera has in its frame.
+    pub fn framed_points(&self) -> impl Iterator<Item = (DVec3, f64)> + '_ {
+        self.placed_points(Shape::framed_points)
+    }
+
+    fn placed_points<'a>(
+        &'a self,
+        points: impl Fn(&'a Shape) -> Box<dyn Iterator<Item = (Vec3, f32)> + 'a> + 'a,
+    ) -> impl Iterator<Item = (DVec3, f64)> + 'a {
+        self.objects.iter().flat_map(move |object| {
             // The largest stretch of any direction bounds how a radius grows.
             let matrix = object.place.matrix3;
             let stretch = matrix.x_axis.length().max(matrix.y_axis.length());
             let stretch = stretch.max(matrix.z_axis.length());
-            self.shapes[object.shape].bounding_points().map(move |(point, radius)| {
+            points(&self.shapes[object.shape]).map(move |(point, radius)| {
                 (object.place.transform_point3(point.as_dvec3()), f64::from(radius) * stretch)
             })
         })
@@ -313,6 +364,10 @@ impl Scene {
                 Shape::Mesh(mesh) => &mut mesh.colours,
                 Shape::Strands(strands) => &mut strands.colours,
                 Shape::Particles(particles) => &mut particles.colours,
+                Shape::Splats(splats) => {
+                    splats.whiten();
+                    continue;
+                }
             };
             colours.iter_mut().for_each(|c| *c = Vec3::ONE.extend(c.w));
         }
@@ -323,9 +378,13 @@ impl Scene {
     fn check(&mut self) -> Result<()> {
         let source = &self.source;
         // First, since a small file can name a shape very often.
-        if u32::try_from(self.triangle_count()).is_err() {
+        if u32::try_from(self.primitive_count()).is_err() {
             let hint = "split the scene";
-            return Err(Error::unsupported(source, "it has more than 2^32 triangles", hint));
+            return Err(Error::unsupported(
+                source,
+                "it has more than 2^32 triangles and splats",
+                hint,
+            ));
         }
         let mut checked = vec![false; self.shapes.len()];
         for object in &self.objects {
@@ -342,9 +401,10 @@ impl Scene {
                 Shape::Mesh(mesh) => check_mesh(mesh, &place)?,
                 Shape::Strands(s) => check_points(&s.points, &place)?,
                 Shape::Particles(p) => check_points(&p.centres, &place)?,
+                Shape::Splats(splats) => check_points(&splats.means, &place)?,
             }
         }
-        if self.triangle_count() == 0 {
+        if self.primitive_count() == 0 {
             let hint = "give a scene with at least one triangle";
             // What was left out may be all there is.
             let what = match &self.warnings[..] {
@@ -357,7 +417,7 @@ impl Scene {
             return Err(Error::invalid(source, what, hint));
         }
         let flat = self.flat_triangles();
-        if flat == self.triangle_count() {
+        if flat == self.primitive_count() {
             let what = format_args!("all of its {flat} triangles have no area").to_string();
             return Err(Error::invalid(source, what, "give a scene with something to see"));
         }
@@ -379,7 +439,7 @@ impl Scene {
                     (b - a).cross(c - a) == DVec3::ZERO
                 })
                 .count(),
-            Shape::Strands(_) | Shape::Particles(_) => 0,
+            Shape::Strands(_) | Shape::Particles(_) | Shape::Splats(_) => 0,
         };
         let by_shape: Vec<usize> = self.shapes.iter().map(of_shape).collect();
         self.objects.iter().map(|o| by_shape[o.shape]).sum()
@@ -442,7 +502,14 @@ pub struct LoadOptions {
     pub grid: Option<String>,
     /// Whether a scene's file may name files outside its own folder.
     pub allow_outside: bool,
+    /// Which way is up in a file that does not say; where not given, as its format has it by
+    /// habit.
+    pub axes: Option<Axes>,
 }
+
+/// What is told of SPZ files: of all formats the one whose files do not keep to its text.
+const GUESSED: &str = "y is taken to point up, as the format has it, and many writers leave it \
+                       down: --axes y-down or y-up says which";
 
 /// Loads the scene that `source` names, as [`load_with`] does without options.
 ///
@@ -465,6 +532,10 @@ pub fn load_with(source: &str, options: &LoadOptions) -> Result<Scene> {
         let what = format_args!("'{source}' has no grids to choose from");
         return Err(Error::config(what, "leave --grid out, or give a .vdb file"));
     }
+    if options.axes.is_some() && !kind.as_deref().is_some_and(source::may_say_up) {
+        let what = format_args!("'{source}' says itself which way is up");
+        return Err(Error::config(what, "leave --axes out"));
+    }
     let mut scene = match source.strip_prefix(BUILTIN) {
         Some(spec) => builtin::build(spec).map_err(|e| no_builtin(source, e))?,
         None => {
@@ -474,11 +545,17 @@ pub fn load_with(source: &str, options: &LoadOptions) -> Result<Scene> {
                 "obj" => obj_file::load(path, &folder)?,
                 "gltf" | "glb" => gltf_file::load(path, &folder)?,
                 "vdb" => vdb_file::load(path, options.grid.as_deref())?,
-                "ply" => splat_file::load(path)?,
+                "ply" => ply_file::load(path)?,
+                "splat" => splat_file::load_packed(path)?,
+                "spz" => splat_file::load_spz(path)?,
                 "tfx" => tfx_file::load(path)?,
                 _ => return Err(no_scene(source)),
             };
             folder.tell(&mut scene);
+            if kind.as_deref() == Some("spz") && options.axes.is_none() {
+                scene.warnings.push(format!("{source}: {GUESSED}"));
+            }
+            scene.stand_up(options.axes.unwrap_or(scene.axes));
             scene
         }
     };

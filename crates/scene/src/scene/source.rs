@@ -24,7 +24,12 @@ pub fn seen_from(source: &str, base: &Path) -> String {
 }
 
 /// The endings of the files that scenes come as.
-pub const ENDINGS: [&str; 6] = ["obj", "gltf", "glb", "vdb", "tfx", "ply"];
+pub const ENDINGS: [&str; 8] = ["obj", "gltf", "glb", "vdb", "tfx", "ply", "splat", "spz"];
+
+/// Whether it may be asked which way is up in files of that ending: in glTF it is y.
+pub(super) fn may_say_up(ending: &str) -> bool {
+    ENDINGS.contains(&ending) && !["gltf", "glb"].contains(&ending)
+}
 
 pub(super) fn ending(path: &Path) -> String {
     path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase()
@@ -92,7 +97,7 @@ pub(super) fn no_scene(source: &str) -> Error {
     }
     Error::config(
         format_args!("'{source}': scenes do not come as '.{ending}'"),
-        "give a .obj, .gltf, .glb, .vdb, .tfx or .ply file, or builtin:NAME",
+        format_args!("give a file that is one of .{}, or builtin:NAME", ENDINGS.join(", .")),
     )
 }
 

@@ -79,7 +79,7 @@ impl Convergence {
         let value = -slope;
         let explained = 1.0 - residual / square_y;
         Some(Convergence {
-            exponent: Estimate { value, low: value - half, high: value + half },
+            exponent: Estimate::around(value, half),
             at_one: libm::exp(mean_y - slope * mean_x),
             r_squared: if square_y > 1e-18 * total { explained.clamp(0.0, 1.0) } else { 1.0 },
             points: points.len(),
@@ -100,20 +100,17 @@ mod tests {
     use super::*;
     use screendoor_trace::random::Stream;
 
-    fn exactly(value: f64) -> Estimate {
-        Estimate { value, low: value, high: value }
-    }
-
     #[test]
     fn a_power_law_is_found() {
-        let points = [1.0, 2.0, 4.0, 8.0, 64.0].map(|n: f64| (n, exactly(12.0 * n.powf(-0.75))));
+        let points =
+            [1.0, 2.0, 4.0, 8.0, 64.0].map(|n: f64| (n, Estimate::exactly(12.0 * n.powf(-0.75))));
         let c = Convergence::fit(&points).unwrap();
         assert!((c.exponent.value - 0.75).abs() < 1e-12 && c.exponent.half_width() < 1e-6);
         assert!((c.at_one - 12.0).abs() < 1e-9);
         assert!((c.r_squared - 1.0).abs() < 1e-9);
         assert_eq!(c.points, 5);
         // Errors that do not fall.
-        let c = Convergence::fit(&[1.0, 2.0, 4.0].map(|n| (n, exactly(3.0)))).unwrap();
+        let c = Convergence::fit(&[1.0, 2.0, 4.0].map(|n| (n, Estimate::exactly(3.0)))).unwrap();
         assert!(c.exponent.value.abs() < 1e-12);
         assert_eq!(c.r_squared, 1.0);
     }
@@ -122,7 +119,7 @@ mod tests {
     #[test]
     fn scatter_widens_the_interval_by_students_t() {
         let points = [(0.0, 0.0), (1.0, 1.0), (2.0, 1.0)]
-            .map(|(x, y): (f64, f64)| (x.exp(), exactly((-y).exp())));
+            .map(|(x, y): (f64, f64)| (x.exp(), Estimate::exactly((-y).exp())));
         let c = Convergence::fit(&points).unwrap();
         assert!((c.exponent.value - 0.5).abs() < 1e-12);
         assert!((c.r_squared - 0.75).abs() < 1e-12);
@@ -144,18 +141,18 @@ mod tests {
         let mut moved = points;
         moved[3].1 = Estimate { value: 2.0, low: 0.0, high: 2000.0 };
         let c = Convergence::fit(&moved).unwrap();
-        let equal = Convergence::fit(&moved.map(|(n, e)| (n, exactly(e.value)))).unwrap();
+        let equal = Convergence::fit(&moved.map(|(n, e)| (n, Estimate::exactly(e.value)))).unwrap();
         assert!((c.exponent.value - 0.5).abs() < (equal.exponent.value - 0.5).abs() / 1.5, "{c:?}");
     }
 
     #[test]
     fn no_exponent_without_errors_or_points() {
-        let law = [1.0, 2.0, 4.0].map(|n: f64| (n, exactly(1.0 / n)));
+        let law = [1.0, 2.0, 4.0].map(|n: f64| (n, Estimate::exactly(1.0 / n)));
         assert!(Convergence::fit(&law).is_some());
         assert_eq!(Convergence::fit(&law[..2]), None);
         for (place, bad) in [(0, 0.0), (1, 1e-13), (2, -1.0), (0, f64::NAN), (1, f64::INFINITY)] {
             let mut points = law;
-            points[place].1 = exactly(bad);
+            points[place].1 = Estimate::exactly(bad);
             assert_eq!(Convergence::fit(&points), None, "{bad}");
         }
         assert_eq!(Convergence::fit(&law.map(|(_, e)| (8.0, e))), None);

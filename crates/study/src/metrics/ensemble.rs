@@ -212,7 +212,7 @@ impl<'a> Ensemble<'a> {
                     0 | 1 => f64::INFINITY,
                     _ => Estimate::of(products).half_width(),
                 };
-                Estimate { value, low: value - half, high: value + half }
+                Estimate::around(value, half)
             }),
             temporal: deviations.finish(),
         }

@@ -43,16 +43,26 @@ pub fn student_t(confidence: f64, runs: usize) -> f64 {
 }
 
 impl Estimate {
+    /// What is known without uncertainty.
+    pub fn exactly(value: f64) -> Self {
+        Self::around(value, 0.0)
+    }
+
+    /// A value and half of its interval's width.
+    pub fn around(value: f64, half: f64) -> Self {
+        Estimate { value, low: value - half, high: value + half }
+    }
+
     /// The mean of `runs` with Student's interval.
     pub fn of(runs: &[f64]) -> Self {
         let n = runs.len() as f64;
         let mean = runs.iter().sum::<f64>() / n.max(1.0);
         if runs.len() < 2 {
-            return Estimate { value: mean, low: mean, high: mean };
+            return Self::exactly(mean);
         }
         let square = runs.iter().map(|r| (r - mean) * (r - mean)).sum::<f64>();
         let half = student_t(0.95, runs.len()) * (square / (n - 1.0) / n).sqrt();
-        Estimate { value: mean, low: mean - half, high: mean + half }
+        Self::around(mean, half)
     }
 
     /// The root of a mean that cannot be negative, such as an RMSE from an MSE.
@@ -107,7 +117,7 @@ mod tests {
         // What runs agree on is no chance: either rounding or a bias.
         let same = |value| Estimate::of(&[value; 5]).standard_errors(5);
         assert_eq!([0.0, ROUNDING / 2.0, 2.0 * ROUNDING].map(same), [0.0, 0.0, f64::INFINITY]);
-        assert_eq!(Estimate::of(&[7.0]), Estimate { value: 7.0, low: 7.0, high: 7.0 });
+        assert_eq!(Estimate::of(&[7.0]), Estimate::exactly(7.0));
     }
 
     #[test]
@@ -117,14 +127,10 @@ mod tests {
         };
         let e = Estimate { value: 0.1, low: -1e-300, high: 2.0 };
         assert_eq!(back(e), e);
-        let unknown = exact(2.0).ratio(exact(0.0));
+        let unknown = Estimate::exactly(2.0).ratio(Estimate::exactly(0.0));
         assert!(back(unknown).value.is_nan());
         assert_eq!((back(unknown).low, back(unknown).high), (0.0, f64::INFINITY));
         assert!(serde_json::from_str::<Estimate>(r#"{"value": 1, "low": 0}"#).is_err());
-    }
-
-    fn exact(value: f64) -> Estimate {
-        Estimate { value, low: value, high: value }
     }
 
     #[test]

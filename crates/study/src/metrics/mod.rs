@@ -30,7 +30,7 @@ pub use region::{PixelClasses, Region};
 pub use spectrum::Spectrum;
 pub use temporal::Temporal;
 
-use screendoor_trace::picture::{Picture, srgb};
+use screendoor_trace::picture::{Picture, Space};
 use screendoor_trace::tile::TILE_PIXELS;
 
 /// What one unit of an error is of the range from black to white.
@@ -60,8 +60,8 @@ pub struct Errors {
 /// # Panics
 /// Where the frames differ in size.
 pub fn errors(picture: &Picture, reference: &Picture, region: &Region) -> Errors {
-    assert_eq!(picture.grid(), reference.grid());
-    let mut sums = ErrorSums::default();
+    assert_eq!((picture.grid(), picture.space()), (reference.grid(), reference.space()));
+    let mut sums = ErrorSums { space: picture.space(), ..ErrorSums::default() };
     let mut visited = 0;
     for tile in picture.tiles_with(reference) {
         let (a, b) = (picture.tile(tile), reference.tile(tile));
@@ -83,6 +83,7 @@ pub fn errors(picture: &Picture, reference: &Picture, region: &Region) -> Errors
 
 #[derive(Default)]
 struct ErrorSums {
+    space: Space,
     square: f64,
     square_srgb: f64,
     signed: f64,
@@ -103,7 +104,7 @@ impl ErrorSums {
             if difference == 0.0 {
                 continue;
             }
-            let encoded = srgb::encode(a) - srgb::encode(b);
+            let encoded = self.space.to_encoded(a) - self.space.to_encoded(b);
             self.square += difference * difference * times as f64;
             self.square_srgb += encoded * encoded * times as f64;
             self.signed += difference * times as f64;

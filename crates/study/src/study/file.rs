@@ -8,10 +8,12 @@ use serde::{Deserialize, Serialize};
 use crate::study::engine::EngineName;
 use screendoor_designs::{Configured, configure};
 use screendoor_scene::capture::{
-    CameraOptions, CaptureOptions, Faces, Order, PatternKind, pattern,
+    CameraOptions, CaptureOptions, Faces, Order, PatternKind, Poses, SplatRules, pattern,
 };
+use screendoor_scene::scene::{self, Axes, LoadOptions, Scene};
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::param::Options;
+use screendoor_trace::picture::Space;
 use screendoor_trace::trace::{MAX_SIDE, SamplePattern};
 
 screendoor_trace::options! {
@@ -143,6 +145,22 @@ pub struct SceneEntry {
     /// Camera: vertical field of view in degrees; 0 for parallel lines.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fov: Option<f64>,
+    /// In place of all three, a file of cameras, seen from the study file's folder: the first of
+    /// them, or `camera_name`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<String>,
+    /// Which of them, by its picture's name or its number from 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera_name: Option<String>,
+    /// How Gaussian splats are drawn: `NAME[:parameter=value,…]`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub splat_rules: Option<String>,
+    /// Which way is up in a file that does not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub axes: Option<Axes>,
+    /// What colours stand for, and so in what designs blend them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub space: Option<Space>,
     /// Linear colour behind the scene.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub background: Option<[f32; 3]>,
@@ -332,9 +350,27 @@ impl Study {
 }
 
 impl SceneEntry {
-    /// How it is captured.
-    pub fn options(&self) -> CaptureOptions {
-        CaptureOptions {
+    /// Loads the scene; paths are seen from the folder `base`.
+    ///
+    /// # Errors
+    /// As [`scene::load_with`].
+    pub fn load(&self, base: &Path) -> Result<Scene> {
+        let source = self.source.as_deref().unwrap_or("");
+        let options = LoadOptions { axes: self.axes, ..LoadOptions::default() };
+        scene::load_with(&scene::seen_from(source, base), &options)
+    }
+
+    /// How it is captured; paths are seen from the folder `base`.
+    ///
+    /// # Errors
+    /// As [`Poses::read`], [`Poses::choose`] and [`SplatRules::parse`].
+    pub fn options(&self, base: &Path) -> Result<CaptureOptions> {
+        let pose = self.camera.as_ref().map(|path| {
+            let poses = Poses::read(&base.join(path), self.size)?;
+            poses.choose(self.camera_name.as_deref()).cloned()
+        });
+        let splats = self.splat_rules.as_deref().map(SplatRules::parse);
+        Ok(CaptureOptions {
             width: self.size[0],
             height: self.size[1],
             samples: self.captured_samples,
@@ -348,9 +384,12 @@ impl SceneEntry {
                 angle: self.angle,
                 distance: self.distance,
                 field_of_view: self.fov,
+                pose: pose.transpose()?,
             },
+            splats: splats.transpose()?.unwrap_or_default(),
+            space: self.space,
             ..CaptureOptions::default()
-        }
+        })
     }
 
     fn check(&self, samples: &[u32]) -> Result<()> {
@@ -375,6 +414,23 @@ impl SceneEntry {
         if !SamplePattern::is_count(self.captured_samples) {
             let count = self.captured_samples;
             return Err(out_of_range("captured_samples", count, "1, 2, 4, 8, 16, 32 or 64"));
+        }
+        if let Some(rules) = &self.splat_rules {
+            SplatRules::parse(rules)?;
+        }
+        if self.camera.is_some()
+            && (self.angle.is_some() || self.distance.is_some() || self.fov.is_some())
+        {
+            return Err(Error::config(
+                format_args!("scene '{name}' has a camera, and angle, distance or fov beside it"),
+                "give one of the two",
+            ));
+        }
+        if self.camera_name.is_some() && self.camera.is_none() {
+            return Err(Error::config(
+                format_args!("scene '{name}' has a camera_name and no camera"),
+                "give the file of cameras as 'camera'",
+            ));
         }
         if let Some([x, y]) = self.pixel.filter(|_| self.trace.is_none()) {
             let [width, height] = self.size;

@@ -125,14 +125,15 @@ impl Reference {
 /// and at the bottom is no block.
 pub fn averaged(picture: &Picture, side: u32) -> Picture {
     let grid = TileGrid::new(picture.width() / side, picture.height() / side);
-    Picture::from_fn(grid, |x, y| {
+    let averaged = Picture::from_fn(grid, |x, y| {
         let mut sum = [0.0; 3];
         for (dx, dy) in (0..side).flat_map(|dy| (0..side).map(move |dx| (dx, dy))) {
             let colour = picture.get(x * side + dx, y * side + dy);
             sum.iter_mut().zip(colour).for_each(|(s, c)| *s += c);
         }
         sum.map(|s| s / f64::from(side * side))
-    })
+    });
+    averaged.in_space(picture.space())
 }
 
 #[cfg(test)]

@@ -37,6 +37,11 @@ pub struct Spread {
 }
 
 impl Spread {
+    /// What is counted, not measured.
+    pub fn exactly(value: f64) -> Self {
+        Spread { low: value, median: value, high: value }
+    }
+
     /// Of some measurements; `None` of none.
     pub fn of(values: &[f64]) -> Option<Self> {
         let mut data = Data::new(values.to_vec());

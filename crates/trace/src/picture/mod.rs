@@ -1,10 +1,11 @@
-//! Pictures: linear colours of a frame's pixels, held tile by tile.
+//! Pictures: colours of a frame's pixels, held tile by tile.
 
 mod exr_file;
 mod opened;
 mod png_chunks;
 mod read;
 mod rgba;
+mod space;
 pub mod srgb;
 mod write;
 
@@ -13,6 +14,7 @@ pub use png_chunks::necessary_chunks;
 pub use read::can_hold;
 pub use read::{layers, open, read};
 pub use rgba::{Rgba, is_deep};
+pub use space::Space;
 pub use write::{Layer, PictureFile, write_exr, write_png};
 
 use crate::tile::{TILE_PIXELS, TileGrid, TileId, TileMap};
@@ -20,10 +22,11 @@ use crate::tile::{TILE_PIXELS, TileGrid, TileId, TileMap};
 /// The pixels of one tile.
 pub type TilePixels = Box<[[f64; 3]; TILE_PIXELS]>;
 
-/// A picture of linear RGB colours. Tiles that nothing touched show the
-/// background and take no memory.
+/// A picture of RGB colours, linear where nothing else is said. Tiles that nothing touched show
+/// the background and take no memory.
 #[derive(Clone, Debug)]
 pub struct Picture {
+    space: Space,
     background: [f64; 3],
     tiles: TileMap<TilePixels>,
 }
@@ -31,12 +34,23 @@ pub struct Picture {
 impl Picture {
     /// A picture that shows `background` everywhere.
     pub fn new(grid: TileGrid, background: [f64; 3]) -> Self {
-        Picture { background, tiles: TileMap::new(grid) }
+        Picture { space: Space::Linear, background, tiles: TileMap::new(grid) }
     }
 
     /// A picture made of finished tiles.
     pub fn from_tiles(background: [f64; 3], tiles: TileMap<TilePixels>) -> Self {
-        Picture { background, tiles }
+        Picture { space: Space::Linear, background, tiles }
+    }
+
+    /// The same numbers, which stand for something else.
+    pub fn in_space(mut self, space: Space) -> Self {
+        self.space = space;
+        self
+    }
+
+    /// What its numbers stand for.
+    pub fn space(&self) -> Space {
+        self.space
     }
 
     /// A picture whose pixel (x, y) has the colour that `pixel` gives.
@@ -104,10 +118,11 @@ impl Picture {
     /// counterpart in `other`.
     ///
     /// # Panics
-    /// Where the frames differ in size.
+    /// Where the frames differ in size, or in what numbers stand for.
     pub fn zip(&self, other: &Picture, change: impl Fn([f64; 3], [f64; 3]) -> [f64; 3]) -> Picture {
-        assert_eq!(self.grid(), other.grid());
+        assert_eq!((self.grid(), self.space), (other.grid(), other.space));
         let mut result = Picture::new(self.grid(), change(self.background, other.background));
+        result.space = self.space;
         for id in self.tiles_with(other) {
             let (a, b) = (self.tile(id), other.tile(id));
             for (within, pixel) in result.tile_mut(id).iter_mut().enumerate() {
@@ -120,12 +135,12 @@ impl Picture {
         result
     }
 
-    /// This picture minus `other`.
+    /// This picture minus `other`: differences of their numbers as they are.
     ///
     /// # Panics
-    /// Where the frames differ in size.
+    /// As [`Picture::zip`].
     pub fn minus(&self, other: &Picture) -> Picture {
-        self.zip(other, |a, b| std::array::from_fn(|i| a[i] - b[i]))
+        self.zip(other, |a, b| std::array::from_fn(|i| a[i] - b[i])).in_space(Space::Linear)
     }
 
     /// How many of its pixels have a channel that is NaN or infinite.

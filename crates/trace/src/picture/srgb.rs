@@ -8,17 +8,20 @@ pub fn decode(encoded: f64) -> f64 {
 /// The sRGB encoding of a linear value; both nominally in [0, 1], values beyond
 /// are clamped.
 pub fn encode(linear: f64) -> f64 {
-    let linear = linear.clamp(0.0, 1.0);
-    if linear <= 0.003_130_8 {
-        linear * 12.92
-    } else {
-        1.055 * libm::pow(linear, 1.0 / 2.4) - 0.055
-    }
+    encode_beyond(linear.clamp(0.0, 1.0))
 }
 
-/// The sRGB encoding in 8 bits, rounded to nearest.
-pub(crate) fn encode8(linear: f64) -> u8 {
-    (encode(linear) * 255.0 + 0.5) as u8
+/// The same without a clamp: the curve goes on above 1, and below 0 it is mirrored.
+pub(crate) fn encode_beyond(linear: f64) -> f64 {
+    let size = linear.abs();
+    let encoded =
+        if size <= 0.003_130_8 { size * 12.92 } else { 1.055 * libm::pow(size, 1.0 / 2.4) - 0.055 };
+    if linear < 0.0 { -encoded } else { encoded }
+}
+
+/// An encoded value in 8 bits, rounded to nearest.
+pub(crate) fn to_8_bits(encoded: f64) -> u8 {
+    (encoded * 255.0 + 0.5) as u8
 }
 
 #[cfg(test)]
@@ -28,8 +31,9 @@ mod tests {
     #[test]
     fn every_8_bit_value_survives_the_round_trip() {
         for v in 0..=255_u8 {
-            assert_eq!(encode8(decode(f64::from(v) / 255.0)), v);
+            assert_eq!(to_8_bits(encode(decode(f64::from(v) / 255.0))), v);
         }
-        assert_eq!((encode8(-1.0), encode8(7.0), encode8(f64::NAN)), (0, 255, 0));
+        let of = |linear| to_8_bits(encode(linear));
+        assert_eq!((of(-1.0), of(7.0), of(f64::NAN)), (0, 255, 0));
     }
 }

@@ -149,7 +149,9 @@ fn encode_exr(
             assert_eq!(layer.picture.grid(), TileGrid::new(width, height));
             // Pixel by pixel: all of them at once would take half as much as the picture.
             let channels = SpecificChannels::rgb(|Vec2(x, y): Vec2<usize>| {
-                let [r, g, b] = layer.picture.get(x as u32, y as u32).map(|c| c as f32);
+                let space = layer.picture.space();
+                let colour = layer.picture.get(x as u32, y as u32);
+                let [r, g, b] = colour.map(|c| space.to_linear(c) as f32);
                 (r, g, b)
             });
             exr::prelude::Layer::new(
@@ -214,7 +216,8 @@ fn png_bytes(path: &Path, picture: &Picture) -> Result<Vec<u8>> {
     let mut pixels = Vec::with_capacity(width as usize * height as usize * 3);
     for y in 0..height {
         for x in 0..width {
-            pixels.extend(picture.get(x, y).map(srgb::encode8));
+            let display = |c| srgb::to_8_bits(picture.space().to_encoded(c));
+            pixels.extend(picture.get(x, y).map(display));
         }
     }
     let mut bytes = Vec::new();

@@ -5,15 +5,19 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::Serialize;
 
 use crate::error::{Error, Result};
+use crate::param::Options;
+use crate::picture::Space;
 use crate::trace::column::{Scalar, ValueType};
 use crate::trace::columns::ColumnId;
 use crate::trace::fragment::MAX_SAMPLES;
 use crate::trace::metadata::MetadataReader;
 use crate::trace::view::View;
 
-/// The newest version of the format that this crate writes, that of traces with a view; it
-/// reads every version with the same major number.
-pub const FORMAT_VERSION: &str = "1.1";
+/// The newest version of the format that this crate writes, that of traces whose colours are
+/// not linear; it reads every version with the same major number.
+pub const FORMAT_VERSION: &str = "1.2";
+/// The version of other traces with a view.
+pub(super) const WITH_VIEW: &str = "1.1";
 /// The version of traces without a view, which are as they were before there was any.
 const WITHOUT_VIEW: &str = "1.0";
 
@@ -97,8 +101,10 @@ pub struct Header {
     pub height: u32,
     /// Where each pixel's samples lie.
     pub pattern: SamplePattern,
-    /// Linear colour behind everything.
+    /// Colour behind everything, in the same space as all colours.
     pub background: [f32; 3],
+    /// What the numbers of colours stand for, in which designs blend them.
+    pub space: Space,
     /// Precision of the colour columns; in a file it follows from their types.
     pub colour: ColourFormat,
     /// What was captured: a file's name, a built-in scene and its parameters.
@@ -131,6 +137,7 @@ mod key {
     pub(super) const DEPTH: &str = "screendoor.depth";
     pub(super) const SOURCE: &str = "screendoor.source";
     pub(super) const CAMERA: &str = "screendoor.camera";
+    pub(super) const SPACE: &str = "screendoor.space";
     pub(super) const CONSTANT: &str = "screendoor.constant.";
 }
 
@@ -202,7 +209,11 @@ impl Header {
 
     /// The version of the format that a file with this header has.
     fn version(&self) -> &'static str {
-        if self.view.is_some() { FORMAT_VERSION } else { WITHOUT_VIEW }
+        match (self.space, self.view) {
+            (Space::Encoded, _) => FORMAT_VERSION,
+            (Space::Linear, Some(_)) => WITH_VIEW,
+            (Space::Linear, None) => WITHOUT_VIEW,
+        }
     }
 
     /// The header as the metadata of the Arrow schema.
@@ -226,6 +237,10 @@ impl Header {
         .chain(self.view.into_iter().flat_map(View::to_metadata))
         .map(|(k, v)| (k.to_string(), v))
         .collect();
+        // What is meant where nothing is said, in all older traces.
+        if self.space != Space::default() {
+            map.insert(key::SPACE.to_string(), self.space.name().to_string());
+        }
         for (column, value) in &self.constants {
             map.insert(format!("{}{}", key::CONSTANT, column.name()), value.to_string());
         }
@@ -267,6 +282,14 @@ impl Header {
         if samples as usize != positions.len() {
             return Err(reader.bad(key::POSITIONS, &format!("{samples} positions")));
         }
+        let space = match map.get(key::SPACE) {
+            None => Space::default(),
+            Some(name) => {
+                let known = Space::ALL.iter().find(|space| space.name() == name);
+                let names: Vec<&str> = Space::CHOICES.iter().map(|choice| choice.name).collect();
+                *known.ok_or_else(|| reader.bad(key::SPACE, &names.join(" or ")))?
+            }
+        };
         let mut constants = BTreeMap::new();
         for column in ColumnId::ALL {
             let name = format!("{}{}", key::CONSTANT, column.name());
@@ -287,6 +310,7 @@ impl Header {
             background: background
                 .try_into()
                 .map_err(|_| reader.bad(key::BACKGROUND, "three numbers"))?,
+            space,
             colour: ColourFormat::default(),
             source: reader.text(key::SOURCE)?.to_string(),
             camera: reader.text(key::CAMERA)?.to_string(),
@@ -311,7 +335,7 @@ pub(super) fn without_view(
 ) -> impl Iterator<Item = (&str, &str)> {
     let entries = metadata.iter().map(|(key, value)| (key.as_str(), value.as_str()));
     entries.filter(|(key, _)| !View::has_key(key)).map(|(key, value)| match (key, value) {
-        (key::VERSION, FORMAT_VERSION) => (key, WITHOUT_VIEW),
+        (key::VERSION, WITH_VIEW) => (key, WITHOUT_VIEW),
         entry => entry,
     })
 }

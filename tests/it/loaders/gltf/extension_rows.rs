@@ -1,11 +1,29 @@
 //! What the rows of extensions are tried with.
 
 use glam::{DVec3, Vec2, Vec3};
+use screendoor::scene::Shape;
 use serde_json::json;
 
 use super::model::{Model, is, middle};
 use super::table::{Case, GREEN, RED, case, told, white, x_of};
 use crate::loaders::mesh;
+
+/// One splat of that size in place of the mesh.
+fn splats(m: &mut Model, scale: f32) {
+    let name = |name: &str| format!("KHR_gaussian_splatting:{name}");
+    let mut attributes = serde_json::Map::new();
+    attributes.insert("POSITION".into(), m.floats(&[1.0, 2.0, 3.0], "VEC3").into());
+    attributes.insert(name("ROTATION"), m.add(&[0, 0, 127, 0], 5120, "VEC4", 1).into());
+    attributes.insert(name("SCALE"), m.floats(&[scale; 3], "VEC3").into());
+    attributes.insert(name("OPACITY"), m.floats(&[0.25], "SCALAR").into());
+    for (l, n) in [(0, 0), (1, 0), (1, 1), (1, 2)] {
+        let harmonic = m.floats(&[1.0 + n as f32, 2.0, 3.0 - n as f32], "VEC3");
+        attributes.insert(name(&format!("SH_DEGREE_{l}_COEF_{n}")), harmonic.into());
+    }
+    *m.primitive() = json!({ "mode": 0, "attributes": attributes, "extensions": {
+        "KHR_gaussian_splatting": { "kernel": "ellipse", "colorSpace": "srgb_rec709_display",
+            "projection": "perspective", "sortingMethod": "cameraDistance" } } });
+}
 
 /// The rows of extensions that are not only named.
 pub fn cases() -> Vec<Case> {
@@ -131,16 +149,49 @@ pub fn cases() -> Vec<Case> {
             },
             |s| is(middle(s), [0.0, 1.0, 0.0], 1.0),
         ),
+        case(
+            "KHR_gaussian_splatting",
+            |m| splats(m, 0.5),
+            |s| {
+                let [Shape::Splats(splats)] = &s.shapes[..] else { return false };
+                splats.means == [Vec3::new(1.0, 2.0, 3.0)]
+                    && splats.scales == [Vec3::new(0.5, 0.5, 0.5)]
+                    && splats.rotations[0].z == 1.0
+                    && splats.opacities == [0.25]
+                    && (splats.degree, splats.harmonics[3]) == (1, [3.0, 2.0, 1.0])
+            },
+        ),
         Case {
             row: "KHR_gaussian_splatting",
-            says: "KHR_gaussian_splatting is not read: its splats are not drawn (4 points)",
+            says: "splats of the kernel 'box' are not drawn (4 splats)",
             edit: |m| {
                 m.another(0);
                 m.json["meshes"][0]["primitives"][1]["extensions"] =
-                    json!({ "KHR_gaussian_splatting": {} });
+                    json!({ "KHR_gaussian_splatting": { "kernel": "box" } });
             },
             good: white,
         },
+        // Scales below 0 are logarithms.
+        case(
+            "KHR_gaussian_splatting",
+            |m| splats(m, -1.0),
+            |s| {
+                let [Shape::Splats(splats)] = &s.shapes[..] else { return false };
+                splats.scales == [Vec3::splat((-1.0_f64).exp() as f32)]
+            },
+        ),
+        case(
+            "KHR_gaussian_splatting_compression_spz_2",
+            |m| {
+                let bytes = crate::loaders::splats::spz(2, false);
+                let accessor = m.add(&bytes, 5121, "SCALAR", bytes.len());
+                let spz = m.json["accessors"][accessor]["bufferView"].clone();
+                *m.primitive() = json!({ "mode": 0, "attributes": {}, "extensions": {
+                    "KHR_gaussian_splatting": { "extensions": {
+                        "KHR_gaussian_splatting_compression_spz_2": { "bufferView": spz } } } } });
+            },
+            |s| matches!(&s.shapes[..], [Shape::Splats(splats)] if splats.means.len() == 3),
+        ),
         told("KHR_lights_punctual", "by the capture's own lights (2 triangles)", |m| {
             m.json["nodes"][0]["extensions"] = json!({ "KHR_lights_punctual": { "light": 0 } });
         }),

@@ -46,7 +46,7 @@ fn application_specific_attributes_are_ignored() {
         attributes["_FOO"] = 0.into();
         attributes["_BATCH_ID"] = 0.into();
     });
-    assert_eq!(scene.unwrap().triangle_count(), 1);
+    assert_eq!(scene.unwrap().primitive_count(), 1);
     // A byte order mark is not in the way.
     let bytes = [b"\xef\xbb\xbf", &hostile::gltf(|_| ())[..]].concat();
     assert!(load_in(folder(&[("a.gltf", &bytes)]).path(), "a.gltf").is_ok());

@@ -71,6 +71,7 @@ where
         grid: TileGrid::new(16, 16),
         positions: (0..N as i32).map(|s| [(s % 8 * 2 - 8) as i8, (s / 8 * 2 - 8) as i8]).collect(),
         background: [0.5; 3],
+        space: Default::default(),
         seed: 3,
         colour_bits: 96,
         view: None,

@@ -167,7 +167,7 @@ mod tests {
     #[test]
     fn the_engine_is_large_and_of_many_parts() {
         let engine = load("builtin:engine").unwrap();
-        assert!(engine.triangle_count() >= 100_000, "{}", engine.triangle_count());
+        assert!(engine.primitive_count() >= 100_000, "{}", engine.primitive_count());
         assert!(engine.objects.len() > 300);
         assert!(engine.shapes.len() < engine.objects.len() / 4, "parts share shapes");
         assert!(engine.materials.iter().all(|m| m.base.w == 0.3 && m.double_sided));

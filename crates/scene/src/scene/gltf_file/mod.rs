@@ -10,6 +10,7 @@ mod json;
 mod material;
 mod pose;
 mod primitive;
+mod splats;
 mod texture;
 mod warnings;
 

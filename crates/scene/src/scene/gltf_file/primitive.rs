@@ -8,6 +8,7 @@ use super::accessor::{Kind, Normalised, Numbers, Type};
 use super::json::{Attributes, Node, Primitive};
 use super::material::{Made, SETS};
 use super::pose::{Bound, Joints, Set, normal_matrix};
+use super::splats;
 use super::warnings::Matter;
 use crate::scene::{Mesh, Shape};
 use screendoor_trace::error::Result;
@@ -26,7 +27,7 @@ pub(super) struct Posed {
 pub(super) struct Drawn {
     /// Which of the scene's shapes, where it is drawn at all.
     pub shape: Option<usize>,
-    /// How many triangles it has; points or lines, where it is made of those.
+    /// How many triangles or splats it has; points or lines, where it is made of those.
     pub items: usize,
     /// What of it is not drawn as it should be.
     pub matters: Vec<Matter>,
@@ -123,12 +124,28 @@ impl Loader<'_> {
                 return Err(self.bad(part, what, "export the file again"));
             }
         };
+        let splats = mode == Mode::Points && primitive.extensions.has(splats::NAME);
         let unit = match mode {
+            Mode::Points if splats => "splat",
             Mode::Points => "point",
             Mode::Lines => "line",
             _ => "triangle",
         };
         let mut matters = self.warnings.extensions_of(unit, primitive.extensions.names());
+        if splats {
+            let (shape, items) = match self.splats(primitive, part)? {
+                Ok(splats) => {
+                    let count = splats.means.len();
+                    self.scene.shapes.push(Shape::Splats(splats));
+                    (Some(self.scene.shapes.len() - 1), count)
+                }
+                Err(missed) => {
+                    matters.push(missed);
+                    (None, self.claimed_items(primitive, mode))
+                }
+            };
+            return Ok(Drawn { shape, items, matters, in_scene: false });
+        }
         if let Some(missed) = self.not_drawn(primitive, mode, unit) {
             matters.push(missed);
             let items = self.claimed_items(primitive, mode);

@@ -5,14 +5,10 @@ use std::collections::HashMap;
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
 use super::geometry::{Face, Geometry, Segment};
-use crate::scene::Mesh;
 use crate::scene::polygon::{Corner, Cutter};
+use crate::scene::{Mesh, far};
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::picture::srgb;
-
-/// A scene further from the origin than this many times its size is moved there before its
-/// places are rounded to single precision.
-const FAR: f64 = 16.0;
 
 /// Makes meshes of a file's faces.
 pub(super) struct Builder<'a> {
@@ -30,13 +26,14 @@ pub(super) struct Builder<'a> {
 impl<'a> Builder<'a> {
     /// One for the file called `place`.
     pub(super) fn new(place: &'a str, geometry: &'a Geometry) -> Self {
+        let used = geometry.corners.iter().map(|c| geometry.positions[c[0] as usize - 1]);
         let linear = |c: f32| srgb::decode(f64::from(c.clamp(0.0, 1.0))) as f32;
         let colour = |c: &Vec4| c.truncate().map(linear).extend(c.w.clamp(0.0, 1.0));
         Builder {
             place,
             geometry,
             colours: geometry.colours.iter().map(colour).collect(),
-            origin: origin(geometry),
+            origin: far::origin(used),
             flat: 0,
             cutter: Cutter::default(),
         }
@@ -111,17 +108,6 @@ impl<'a> Builder<'a> {
         }
         mesh.positions.len() as u32 - 1
     }
-}
-
-/// Where the scene is moved from: the middle of what its faces use, where it is so far away
-/// that single precision would show; else the origin.
-fn origin(geometry: &Geometry) -> DVec3 {
-    let used = || geometry.corners.iter().map(|c| geometry.positions[c[0] as usize - 1]);
-    let low = used().fold(DVec3::MAX, DVec3::min);
-    let high = used().fold(DVec3::MIN, DVec3::max);
-    let furthest = low.abs().max(high.abs()).max_element();
-    let is_far = furthest > FAR * (high - low).max_element();
-    if is_far && furthest.is_finite() { (low + high) / 2.0 } else { DVec3::ZERO }
 }
 
 /// The mesh with what its corners do not say filled in.

@@ -165,7 +165,8 @@ fn planes(picture: &Picture, most: f32) -> Planes {
     for y in 0..picture.height() {
         for x in 0..picture.width() {
             for (plane, value) in planes.iter_mut().zip(picture.get(x, y)) {
-                plane.push((value as f32).max(0.0).min(most));
+                let linear = picture.space().to_linear(value) as f32;
+                plane.push(linear.max(0.0).min(most));
             }
         }
     }

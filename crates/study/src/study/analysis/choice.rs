@@ -182,7 +182,7 @@ fn separation(results: &Results, best: RunName<'_>, second: RunName<'_>) -> Sepa
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::analysis::made_up::{exactly, planted};
+    use crate::study::analysis::made_up::planted;
     use screendoor_rop::Promise;
     use screendoor_trace::param::Options;
 
@@ -204,7 +204,7 @@ mod tests {
                 ("base", &[near(4.0)]),
                 ("same", &[near(3.99)]),
                 ("large", &[near(2.0)]),
-                ("exact", &[exactly(0.0)]),
+                ("exact", &[Estimate::exactly(0.0)]),
             ],
         );
         for r in &mut results.records {

@@ -14,14 +14,14 @@ pub fn convergence(results: &Results, scene: &str, series: &str) -> Option<Conve
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::analysis::made_up::{exactly, planted};
+    use crate::study::analysis::made_up::planted;
 
     #[test]
     fn a_power_law_is_found() {
         let counts = [2, 4, 8, 16];
-        let mut results = planted(&["s"], &counts, &[("a", &[exactly(1.0)])]);
+        let mut results = planted(&["s"], &counts, &[("a", &[Estimate::exactly(1.0)])]);
         for record in &mut results.records {
-            record.covered.rmse = exactly(20.0 * f64::from(record.samples).powf(-0.75));
+            record.covered.rmse = Estimate::exactly(20.0 * f64::from(record.samples).powf(-0.75));
         }
         let fitted = convergence(&results, "s", "a").unwrap();
         assert!((fitted.exponent.value - 0.75).abs() < 1e-12, "{fitted:?}");
@@ -30,7 +30,7 @@ mod tests {
         results.records.truncate(2);
         assert_eq!(convergence(&results, "s", "a"), None);
         for record in &mut results.records {
-            record.covered.rmse = exactly(0.0);
+            record.covered.rmse = Estimate::exactly(0.0);
         }
         assert_eq!(convergence(&results, "s", "a"), None);
     }

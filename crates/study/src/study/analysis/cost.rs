@@ -63,18 +63,17 @@ impl Cost {
     /// # Errors
     /// Why there is no figure.
     pub fn of(self, record: &Record) -> Result<Spread, String> {
-        let one = |v: f64| Spread { low: v, median: v, high: v };
         let counted = match self {
             Cost::State => {
                 let bytes = record.state_bytes().ok_or("its state grows with the fragments")?;
-                return Ok(one(bytes));
+                return Ok(Spread::exactly(bytes));
             }
             Cost::Moved => record.bytes_moved_per_fragment(),
             Cost::Hashes => record.hashes_per_fragment(),
             Cost::Comparators => record.comparators_per_fragment(),
             Cost::Cpu | Cost::Gpu => return self.time(record),
         };
-        counted.map(one).ok_or("no events were counted".to_string())
+        counted.map(Spread::exactly).ok_or("no events were counted".to_string())
     }
 
     fn time(self, record: &Record) -> Result<Spread, String> {
@@ -107,12 +106,13 @@ impl Cost {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::analysis::made_up::{exactly, planted};
+    use crate::metrics::Estimate;
+    use crate::study::analysis::made_up::planted;
     use crate::study::record::Speed;
 
     #[test]
     fn what_grows_has_no_figure_and_time_needs_an_engine() {
-        let two = &[exactly(1.0), exactly(2.0)];
+        let two = &[Estimate::exactly(1.0), Estimate::exactly(2.0)];
         let mut results = planted(&["s", "t"], &[8], &[("a", two)]);
         let run = RunName { series: "a", samples: 8 };
         results.records[0].state_bits.samples = 784;

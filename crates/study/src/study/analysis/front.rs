@@ -95,7 +95,7 @@ fn point<'a>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::analysis::made_up::{exactly, planted};
+    use crate::study::analysis::made_up::planted;
 
     #[test]
     fn a_dominated_point_is_found() {
@@ -112,10 +112,10 @@ mod tests {
             &["s", "t"],
             &[8],
             &[
-                ("a", &[exactly(4.0), exactly(4.0)]),
-                ("worse", &[exactly(5.0), exactly(5.0)]),
-                ("grows", &[exactly(1.0), exactly(1.0)]),
-                ("gone", &[exactly(1.0), exactly(1.0)]),
+                ("a", &[Estimate::exactly(4.0), Estimate::exactly(4.0)]),
+                ("worse", &[Estimate::exactly(5.0), Estimate::exactly(5.0)]),
+                ("grows", &[Estimate::exactly(1.0), Estimate::exactly(1.0)]),
+                ("gone", &[Estimate::exactly(1.0), Estimate::exactly(1.0)]),
             ],
         );
         for r in results.records.iter_mut().filter(|r| r.series == "grows") {

@@ -13,11 +13,6 @@ use crate::study::throughput::Spread;
 use screendoor_rop::{EventCounts, Promise, StateBits};
 use screendoor_trace::trace::{AlphaStatistics, Distribution, Objects, Statistics};
 
-/// A value that is known without doubt.
-pub fn exactly(value: f64) -> Estimate {
-    Estimate { value, low: value, high: value }
-}
-
 /// Results with these errors: for each design one a scene, the same at all sample counts.
 /// The first design is the baseline.
 pub fn planted(scenes: &[&str], counts: &[u32], designs: &[(&str, &[Estimate])]) -> Results {
@@ -126,7 +121,7 @@ pub fn record(scene: &str, series: &str, samples: u32, rmse: Estimate) -> Record
         mean: Estimate { value: 0.001, low: -0.01, high: 0.012 },
         max: rmse.value * 8.0,
         variance: Some(rmse.value * rmse.value),
-        bias_squared: Some(exactly(0.0)),
+        bias_squared: Some(Estimate::exactly(0.0)),
         temporal: None,
     };
     Record {

@@ -21,4 +21,6 @@ pub use convergence::convergence;
 pub use cost::Cost;
 pub use front::{Point, Points, front, points};
 pub use kept::kept;
-pub use relative::{ROUNDING, RunName, baseline, ratio, ratio_on, reference_count, relative};
+pub use relative::{
+    ROUNDING, RunName, baseline, ratio, ratio_on, reference_count, relative, shares,
+};

@@ -62,8 +62,7 @@ pub fn ratio_on(
 ) -> Option<Estimate> {
     let find = |r: RunName<'_>| results.record(scene, r.series, r.samples);
     let (own, other) = (find(run)?, find(to)?);
-    let one = Estimate { value: 1.0, low: 1.0, high: 1.0 };
-    Some(if run == to { one } else { shares(&[(own, other)]) })
+    Some(if run == to { Estimate::exactly(1.0) } else { shares(&[(own, other)]) })
 }
 
 /// The same over all scenes: the geometric mean of the scenes' shares. Their intervals'
@@ -78,7 +77,7 @@ pub fn ratio(
     to: RunName<'_>,
 ) -> Result<Estimate, Vec<String>> {
     match (records_over_scenes(results, run), records_over_scenes(results, to)) {
-        (Ok(_), Ok(_)) if run == to => Ok(Estimate { value: 1.0, low: 1.0, high: 1.0 }),
+        (Ok(_), Ok(_)) if run == to => Ok(Estimate::exactly(1.0)),
         (Ok(own), Ok(other)) => Ok(shares(&own.into_iter().zip(other).collect::<Vec<_>>())),
         (own, other) => {
             // In the study's order, each once.
@@ -104,10 +103,11 @@ pub(crate) fn has_interval(results: &Results, run: RunName<'_>) -> bool {
         .is_ok_and(|records| records.iter().all(|r| r.seeds > 1 || !r.promises.seeded))
 }
 
-/// Geometric mean of pairs of errors. Without any error on any scene it is 0.
-fn shares(pairs: &[(&Record, &Record)]) -> Estimate {
+/// Geometric mean of one run's errors as shares of another's, pair by pair: an RMSE over covered
+/// pixels below [`ROUNDING`] counts as that; without any error in any pair it is 0.
+pub fn shares(pairs: &[(&Record, &Record)]) -> Estimate {
     if pairs.iter().all(|(own, _)| own.covered.rmse.high == 0.0) {
-        return Estimate { value: 0.0, low: 0.0, high: 0.0 };
+        return Estimate::exactly(0.0);
     }
     let (mut logs, mut square) = (0.0, 0.0);
     for (own, other) in pairs {
@@ -129,7 +129,7 @@ fn above_rounding(e: Estimate) -> Estimate {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::analysis::made_up::{exactly, planted};
+    use crate::study::analysis::made_up::planted;
 
     fn run(series: &str, samples: u32) -> RunName<'_> {
         RunName { series, samples }
@@ -140,7 +140,7 @@ mod tests {
         for (counts, nearest) in
             [(&[2, 8, 32][..], 8), (&[4, 16], 4), (&[1, 2], 2), (&[16, 64], 16), (&[4], 4)]
         {
-            let study = planted(&["s"], counts, &[("a", &[exactly(1.0)])]).study;
+            let study = planted(&["s"], counts, &[("a", &[Estimate::exactly(1.0)])]).study;
             assert_eq!(reference_count(&study), nearest, "{counts:?}");
         }
     }
@@ -163,12 +163,12 @@ mod tests {
             ratio_on(&results, "s", run("b", 8), baseline(&results.study)).unwrap().value,
             0.5
         );
-        assert_eq!(relative(&results, run("a", 8)).unwrap(), exactly(1.0));
+        assert_eq!(relative(&results, run("a", 8)).unwrap(), Estimate::exactly(1.0));
     }
 
     #[test]
     fn a_missing_scene_is_named_and_never_a_zero() {
-        let two = &[exactly(4.0), exactly(9.0)];
+        let two = &[Estimate::exactly(4.0), Estimate::exactly(9.0)];
         let mut results = planted(&["s", "t"], &[8], &[("a", two), ("b", two)]);
         results.records.retain(|r| (r.series.as_str(), r.scene.as_str()) != ("b", "t"));
         assert_eq!(relative(&results, run("b", 8)), Err(vec!["t".to_string()]));
@@ -185,13 +185,13 @@ mod tests {
             &["s", "t"],
             &[8],
             &[
-                ("a", &[exactly(1.0), exactly(1.0)]),
-                ("some", &[exactly(0.0), exactly(1.0)]),
-                ("exact", &[exactly(0.0), exactly(0.0)]),
+                ("a", &[Estimate::exactly(1.0), Estimate::exactly(1.0)]),
+                ("some", &[Estimate::exactly(0.0), Estimate::exactly(1.0)]),
+                ("exact", &[Estimate::exactly(0.0), Estimate::exactly(0.0)]),
             ],
         );
         let some = relative(&results, run("some", 8)).unwrap();
         assert!((some.value - ROUNDING.sqrt()).abs() < 1e-12, "{some:?}");
-        assert_eq!(relative(&results, run("exact", 8)).unwrap(), exactly(0.0));
+        assert_eq!(relative(&results, run("exact", 8)).unwrap(), Estimate::exactly(0.0));
     }
 }

@@ -4,6 +4,8 @@ use crate::study::publications::noise::{CORRELATION_SEEDS, FigureNoise, Noise, e
 use crate::study::publications::sampling::layers;
 use crate::study::publications::table_1::study_of;
 use crate::study::publications::{Effort, capture, pictures, replay};
+use std::path::Path;
+
 use screendoor_scene::capture::CaptureOptions;
 use screendoor_scene::scene;
 use screendoor_trace::error::Result;
@@ -34,7 +36,8 @@ pub type NamedPicture = (&'static str, Picture);
 
 /// A rectangle of a picture.
 fn crop(picture: &Picture, [x0, y0]: [u32; 2], side: u32) -> Picture {
-    Picture::from_fn(TileGrid::new(side, side), |x, y| picture.get(x0 + x, y0 + y))
+    let pixel = |x, y| picture.get(x0 + x, y0 + y);
+    Picture::from_fn(TileGrid::new(side, side), pixel).in_space(picture.space())
 }
 
 /// What a figure's panels share.
@@ -129,5 +132,5 @@ pub(super) fn figures(effort: Effort) -> Result<(Vec<NamedPicture>, FigureNoise)
 fn built_in(source: &str, effort: Effort) -> Result<Trace> {
     let study = study_of(effort)?;
     let entry = study.scenes.iter().find(|s| s.drawn() == source).expect("it is in the table");
-    capture(source, &entry.options(), entry.white)
+    capture(source, &entry.options(Path::new(""))?, entry.white)
 }

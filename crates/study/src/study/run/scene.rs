@@ -8,7 +8,6 @@ use crate::study::results::SceneFacts;
 use crate::study::run::store::Store;
 use screendoor_designs::REFERENCE;
 use screendoor_scene::capture::Capture;
-use screendoor_scene::scene;
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::output::OutputFile;
 use screendoor_trace::tile::{TILE_PIXELS, TileGrid, TileMap};
@@ -50,9 +49,8 @@ impl OpenScene {
         let warnings = || match warnings {
             Some(warnings) => Ok(warnings),
             // Drawn by a process that ended before it could say so.
-            None => entry.source.as_deref().map_or(Ok(Vec::new()), |source| {
-                Ok(scene::load(&scene::seen_from(source, base))?.warnings)
-            }),
+            None if entry.source.is_some() => Ok(entry.load(base)?.warnings),
+            None => Ok(Vec::new()),
         };
         let facts = facts(store, index, &trace, shown, warnings, watch)?;
         let all = trace.header().pattern.samples();
@@ -66,15 +64,14 @@ impl OpenScene {
 
 /// Draws a scene into the trace at `path`. Returns what of it is not drawn.
 fn draw(entry: &SceneEntry, base: &Path, path: &Path) -> Result<Vec<String>> {
-    let source = entry.source.as_deref().unwrap_or("");
-    let mut scene = scene::load(&scene::seen_from(source, base))?;
+    let mut scene = entry.load(base)?;
     if let Some(texture) = &entry.texture {
         scene.apply_texture(&base.join(texture))?;
     }
     if entry.white {
         scene.whiten();
     }
-    let options = entry.options();
+    let options = entry.options(base)?;
     let capture = Capture::new(&scene, &options)?;
     let file = OutputFile::create(path)?;
     let place = path.display().to_string();

@@ -488,6 +488,7 @@ fn damaged(path: &Path, what: &str) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::metrics::Estimate;
     use crate::study::analysis::made_up;
     use serde_json::{Map, Value};
 
@@ -495,7 +496,7 @@ mod tests {
     fn reread(change: impl FnOnce(&mut Map<String, Value>)) -> Result<Option<Record>> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.json");
-        let record = made_up::record("a", "lk", 8, made_up::exactly(1.5));
+        let record = made_up::record("a", "lk", 8, Estimate::exactly(1.5));
         let Value::Object(mut fields) = serde_json::to_value(&record).unwrap() else { panic!() };
         change(&mut fields);
         Store::put_sealed(&path, &fields).unwrap();
@@ -505,7 +506,7 @@ mod tests {
     #[test]
     fn records_of_older_folders_are_read_and_those_of_later_versions_refused_as_such() {
         let today = reread(|fields| assert!(!fields.contains_key(VERSION))).unwrap().unwrap();
-        assert_eq!(today, made_up::record("a", "lk", 8, made_up::exactly(1.5)));
+        assert_eq!(today, made_up::record("a", "lk", 8, Estimate::exactly(1.5)));
         // What was not measured then is not there.
         let older = reread(|fields| {
             for metric in ["filtered", "flip", "flip_hdr", "spectrum"] {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::*;
-use crate::trace::header::FORMAT_VERSION;
+use crate::trace::header::WITH_VIEW;
 use crate::trace::{Fragment, Header, SampleMask, SamplePattern, Trace, TraceWriter, WriteOptions};
 
 /// The view of the example of `docs/TRACE_FORMAT.md`: from 10 before the origin, 90 degrees
@@ -70,7 +70,7 @@ fn a_view_comes_back_bit_for_bit() {
     for view in [example(), parallel(), odd] {
         view.check().unwrap();
         let map = header(Some(view)).to_metadata();
-        assert_eq!(map["screendoor.version"], FORMAT_VERSION);
+        assert_eq!(map["screendoor.version"], WITH_VIEW);
         let found = read(&map).unwrap().unwrap();
         let bits = |v: &View| v.world_to_view.map(f64::to_bits);
         assert!(found == view && bits(&found) == bits(&view));

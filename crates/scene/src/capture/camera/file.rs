@@ -1,0 +1,303 @@
+//! Cameras in files beside a scene: `cameras.json` of trainings of Gaussian splats (Kerbl et
+//! al. 2023) and `transforms.json` of nerfstudio, instant-ngp and Blender's synthetic scenes.
+
+use std::path::Path;
+
+use glam::DVec3;
+use serde::Deserialize;
+
+use crate::capture::camera::Pose;
+use screendoor_trace::error::{Error, Result};
+
+/// The longest file that is read, in bytes.
+const MAX_BYTES: u64 = 1 << 28;
+
+/// A camera of `cameras.json`: where it stands, and the rows of the matrix whose columns are
+/// its axes, to the right, downwards and forward.
+#[derive(Deserialize)]
+struct Trained {
+    img_name: Option<String>,
+    width: u32,
+    height: u32,
+    position: [f64; 3],
+    rotation: [[f64; 3]; 3],
+    fx: f64,
+    fy: f64,
+}
+
+/// `transforms.json`. What frames say of their lenses comes before what the file says.
+#[derive(Deserialize)]
+struct Transforms {
+    #[serde(flatten)]
+    lens: Lens,
+    frames: Vec<Frame>,
+}
+
+#[derive(Deserialize)]
+struct Frame {
+    file_path: Option<String>,
+    /// The rows of a matrix from camera space, x to the right, y up and z backwards.
+    transform_matrix: Vec<[f64; 4]>,
+    #[serde(flatten)]
+    lens: Lens,
+}
+
+#[derive(Clone, Copy, Deserialize)]
+struct Lens {
+    w: Option<f64>,
+    h: Option<f64>,
+    fl_x: Option<f64>,
+    fl_y: Option<f64>,
+    cx: Option<f64>,
+    cy: Option<f64>,
+    camera_angle_x: Option<f64>,
+    camera_angle_y: Option<f64>,
+    k1: Option<f64>,
+    k2: Option<f64>,
+    k3: Option<f64>,
+    k4: Option<f64>,
+    p1: Option<f64>,
+    p2: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum File {
+    Trained(Vec<Trained>),
+    Transforms(Box<Transforms>),
+}
+
+/// The cameras of a file, in its order.
+#[derive(Clone, Debug)]
+pub struct Poses {
+    /// The cameras.
+    pub poses: Vec<Pose>,
+    /// What could not be honoured.
+    pub warnings: Vec<String>,
+}
+
+impl Poses {
+    /// Reads the cameras of the file at `path`. Where it says nothing of its frames' size they
+    /// have the size `frame`, in pixels.
+    ///
+    /// # Errors
+    /// [`Error::Io`] where it cannot be read, [`Error::Invalid`] where it holds no cameras.
+    pub fn read(path: &Path, frame: [u32; 2]) -> Result<Self> {
+        let fail = |e| Error::io("read", path, e);
+        let place = path.display().to_string();
+        let length = std::fs::metadata(path).map_err(fail)?.len();
+        if length > MAX_BYTES {
+            let hint = "give a file of fewer cameras";
+            return Err(Error::unsupported(place, "it is longer than 256 MiB", hint));
+        }
+        let bytes = std::fs::read(path).map_err(fail)?;
+        let hint = "give a cameras.json of a training, or a transforms.json";
+        let file: File = serde_json::from_slice(&bytes).map_err(|e| {
+            let what = match e.is_data() {
+                // The library says that no variant fits.
+                true => "it holds no cameras that are known".to_string(),
+                false => format!("it is no JSON: {e}"),
+            };
+            Error::invalid(&place, what, hint)
+        })?;
+        let mut warnings = Vec::new();
+        let poses: Vec<Pose> = match file {
+            File::Trained(list) => list.into_iter().enumerate().map(trained).collect(),
+            File::Transforms(file) => {
+                let all = file.frames.iter().enumerate();
+                let poses = all.map(|(i, one)| {
+                    let lens = one.lens.or(file.lens);
+                    if lens.is_distorted() && warnings.is_empty() {
+                        let what = "its lenses' distortion is left out: give undistorted cameras";
+                        warnings.push(format!("{place}: {what}"));
+                    }
+                    transformed(i, one, &lens, frame).map_err(|what| {
+                        Error::invalid(format_args!("{place}, frame {i}"), what, hint)
+                    })
+                });
+                poses.collect::<Result<_>>()?
+            }
+        };
+        if poses.is_empty() {
+            return Err(Error::invalid(place, "it holds no camera", hint));
+        }
+        Ok(Poses { poses, warnings })
+    }
+
+    /// The camera of that name, or that number counted from 0; the first where none is asked
+    /// for.
+    ///
+    /// # Errors
+    /// [`Error::Config`] where there is none.
+    pub fn choose(&self, wanted: Option<&str>) -> Result<&Pose> {
+        let Some(wanted) = wanted else { return Ok(&self.poses[0]) };
+        let named = self.poses.iter().find(|pose| pose.name == wanted);
+        let stem = |pose: &&Pose| {
+            let path = Path::new(&pose.name);
+            [path.file_name(), path.file_stem()]
+                .iter()
+                .flatten()
+                .any(|s| s.to_str() == Some(wanted))
+        };
+        let numbered = || wanted.parse().ok().and_then(|i: usize| self.poses.get(i));
+        named.or_else(|| self.poses.iter().find(stem)).or_else(numbered).ok_or_else(|| {
+            Error::unknown("camera", wanted, self.poses.iter().map(|pose| pose.name.as_str()))
+        })
+    }
+}
+
+fn trained((i, camera): (usize, Trained)) -> Pose {
+    let row = camera.rotation;
+    let column = |k: usize| DVec3::new(row[0][k], row[1][k], row[2][k]);
+    Pose {
+        name: camera.img_name.unwrap_or_else(|| i.to_string()),
+        eye: DVec3::from(camera.position),
+        axes: [column(0), column(1), column(2)],
+        focal: [camera.fx, camera.fy],
+        principal: [camera.width, camera.height].map(|side| f64::from(side) / 2.0),
+        size: [camera.width, camera.height],
+    }
+}
+
+impl Lens {
+    fn or(self, other: Lens) -> Self {
+        Lens {
+            w: self.w.or(other.w),
+            h: self.h.or(other.h),
+            fl_x: self.fl_x.or(other.fl_x),
+            fl_y: self.fl_y.or(other.fl_y),
+            cx: self.cx.or(other.cx),
+            cy: self.cy.or(other.cy),
+            camera_angle_x: self.camera_angle_x.or(other.camera_angle_x),
+            camera_angle_y: self.camera_angle_y.or(other.camera_angle_y),
+            k1: self.k1.or(other.k1),
+            k2: self.k2.or(other.k2),
+            k3: self.k3.or(other.k3),
+            k4: self.k4.or(other.k4),
+            p1: self.p1.or(other.p1),
+            p2: self.p2.or(other.p2),
+        }
+    }
+
+    fn is_distorted(&self) -> bool {
+        let all = [self.k1, self.k2, self.k3, self.k4, self.p1, self.p2];
+        all.into_iter().flatten().any(|k| k != 0.0)
+    }
+}
+
+fn transformed(
+    i: usize,
+    frame: &Frame,
+    lens: &Lens,
+    size: [u32; 2],
+) -> std::result::Result<Pose, String> {
+    let [rows @ .., _] = &frame.transform_matrix[..] else {
+        return Err("its matrix has no rows".into());
+    };
+    let rows: &[[f64; 4]; 3] = match (rows.try_into(), frame.transform_matrix.as_slice().try_into())
+    {
+        // Four rows, or three where the last one, 0 0 0 1, is left out.
+        (Ok(rows), _) | (_, Ok(rows)) => rows,
+        _ => return Err("its matrix has neither three nor four rows".into()),
+    };
+    let column = |k: usize| DVec3::new(rows[0][k], rows[1][k], rows[2][k]);
+    let size = match (lens.w, lens.h) {
+        (Some(w), Some(h)) => {
+            let side = |v: f64| (1.0..=65536.0).contains(&v).then(|| v.round() as u32);
+            [w, h].map(side)
+        }
+        _ => size.map(Some),
+    };
+    let [Some(w), Some(h)] = size else {
+        return Err("its frame has no size of 1 to 65536 pixels".into());
+    };
+    let sides = [w, h].map(f64::from);
+    let from_angle = |angle: Option<f64>, side: f64| angle.map(|a| side / 2.0 / libm::tan(a / 2.0));
+    let x = lens.fl_x.or(from_angle(lens.camera_angle_x, sides[0]));
+    let y = lens.fl_y.or(from_angle(lens.camera_angle_y, sides[1]));
+    let Some([fx, fy]) = x.or(y).map(|either| [x.unwrap_or(either), y.unwrap_or(either)]) else {
+        return Err("it says neither 'fl_x' nor 'camera_angle_x'".into());
+    };
+    Ok(Pose {
+        name: frame.file_path.clone().unwrap_or_else(|| i.to_string()),
+        eye: column(3),
+        axes: [column(0), -column(1), -column(2)],
+        focal: [fx, fy],
+        principal: [lens.cx.unwrap_or(sides[0] / 2.0), lens.cy.unwrap_or(sides[1] / 2.0)],
+        size: [w, h],
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Poses> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("cameras.json");
+        std::fs::write(&path, text).unwrap();
+        Poses::read(&path, [40, 20])
+    }
+
+    #[test]
+    fn both_kinds_say_the_same() {
+        // A quarter turn about the vertical: the camera looks along x.
+        let trained = read(
+            r#"[{"id": 0, "img_name": "a", "width": 40, "height": 20, "position": [1, 2, 3],
+                "rotation": [[0, 0, 1], [0, 1, 0], [-1, 0, 0]], "fx": 50.0, "fy": 60.0}]"#,
+        );
+        let transforms = read(
+            r#"{"fl_x": 50, "fl_y": 60, "w": 40, "h": 20, "k1": 0, "frames": [{"file_path": "a",
+                "transform_matrix": [[0, 0, -1, 1], [0, -1, 0, 2], [-1, 0, 0, 3], [0, 0, 0, 1]]}]}"#,
+        );
+        let [a, b] = [trained.unwrap(), transforms.unwrap()].map(|p| p.poses[0].clone());
+        assert_eq!(a, b);
+        assert_eq!(a.axes, [-DVec3::Z, DVec3::Y, DVec3::X]);
+        let angle = read(
+            r#"{"camera_angle_x": 1.5707963267948966, "frames": [{"k1": 0.1,
+                "transform_matrix": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]}]}"#,
+        )
+        .unwrap();
+        let [x, y] = angle.poses[0].focal;
+        assert!((x - 20.0).abs() < 1e-9 && x == y);
+        assert_eq!((angle.poses[0].size, angle.warnings.len()), ([40, 20], 1));
+    }
+
+    #[test]
+    fn cameras_are_chosen_by_name_stem_or_number() {
+        let camera = |name: &str| Pose {
+            name: name.into(),
+            eye: DVec3::ZERO,
+            axes: [DVec3::X, DVec3::Y, DVec3::Z],
+            focal: [1.0; 2],
+            principal: [0.5; 2],
+            size: [1; 2],
+        };
+        let poses = vec![camera("images/b.png"), camera("7"), camera("c")];
+        let all = Poses { poses, warnings: Vec::new() };
+        let chosen = |wanted| all.choose(wanted).map(|p| p.name.clone());
+        assert_eq!(chosen(None).unwrap(), "images/b.png");
+        assert_eq!(chosen(Some("b")).unwrap(), "images/b.png");
+        assert_eq!(chosen(Some("b.png")).unwrap(), "images/b.png");
+        assert_eq!(chosen(Some("7")).unwrap(), "7");
+        assert_eq!(chosen(Some("2")).unwrap(), "c");
+        assert!(chosen(Some("3")).is_err());
+    }
+
+    #[test]
+    fn what_holds_no_cameras_is_one_error() {
+        for (text, part) in [
+            ("{", "no JSON"),
+            ("[]", "no camera"),
+            ("{}", "no cameras that are known"),
+            (r#"{"frames": [{"transform_matrix": [[1, 0, 0, 0]]}]}"#, "rows"),
+            (
+                r#"{"frames": [{"transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,0]]}]}"#,
+                "neither 'fl_x'",
+            ),
+        ] {
+            let error = read(text).unwrap_err().to_string();
+            assert!(error.contains(part) && !error.contains('\n'), "{error}");
+        }
+    }
+}

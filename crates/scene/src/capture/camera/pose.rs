@@ -1,0 +1,192 @@
+//! Cameras that stand where they are told.
+
+use glam::{DMat3, DMat4, DVec3, DVec4};
+
+use crate::capture::camera::{Camera, NEAREST_AMONG};
+use crate::scene::Scene;
+use screendoor_trace::error::{Error, Result};
+use screendoor_trace::trace::{Projection, View};
+
+/// How far axes may be from unit vectors at right angles: what a file's decimals leave.
+const RIGID: f64 = 1e-3;
+/// How far the shapes of two frames may differ, as a share: what rounding to pixels leaves.
+const SHAPE: f64 = 0.02;
+
+/// A camera in perspective, in the space of the scene's file.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Pose {
+    /// Its name, for people.
+    pub name: String,
+    /// Where it stands.
+    pub eye: DVec3,
+    /// Unit vectors to the right, downwards and along the view axis.
+    pub axes: [DVec3; 3],
+    /// Focal lengths in pixels, along x and y.
+    pub focal: [f64; 2],
+    /// Where the view axis meets the frame, in pixels from its top left.
+    pub principal: [f64; 2],
+    /// The frame's size in pixels.
+    pub size: [u32; 2],
+}
+
+impl Pose {
+    /// The camera over a frame of `width` × `height` pixels of the same shape.
+    ///
+    /// # Errors
+    /// [`Error::Config`] for a pose that is none, a frame of another shape, and where the
+    /// scene lies behind it.
+    pub(super) fn camera(&self, scene: &Scene, width: u32, height: u32) -> Result<Camera> {
+        let bad = |what: String, hint: &str| {
+            Err(Error::config(format_args!("the camera '{}' {what}", self.name), hint))
+        };
+        let axes = DMat3::from_cols(self.axes[0], self.axes[1], self.axes[2]);
+        let gram = axes.transpose() * axes;
+        let rigid = (gram - DMat3::IDENTITY).to_cols_array().iter().all(|v| v.abs() < RIGID);
+        let lens = self.focal.iter().all(|f| f.is_finite() && *f > 0.0)
+            && self.principal.iter().all(|p| p.is_finite());
+        if !(rigid && axes.determinant() > 0.0 && self.eye.is_finite()) {
+            return bad("has no axes at right angles".into(), "correct its matrix");
+        }
+        if !lens || self.size.contains(&0) {
+            return bad("has no lens".into(), "give it focal lengths in pixels above 0");
+        }
+        let scale = [width, height].map(f64::from);
+        let scale = [0, 1].map(|i| scale[i] / f64::from(self.size[i]));
+        if (scale[0] / scale[1] - 1.0).abs() > SHAPE {
+            let [w, h] = self.size;
+            let what =
+                format!("is one of {w}x{h} pixels, and not of the shape of {width}x{height}");
+            return bad(what, "give --size that shape");
+        }
+
+        let turn = scene.world.matrix3;
+        let forward = (turn * self.axes[2]).normalize();
+        let right = turn * self.axes[0];
+        let right = (right - forward * right.dot(forward)).normalize();
+        let up = right.cross(forward);
+        let back = -forward;
+        let eye = scene.world.transform_point3(self.eye);
+        let (mut near, mut far) = (f64::INFINITY, f64::NEG_INFINITY);
+        for (point, around) in scene.bounding_points() {
+            let distance = forward.dot(point - eye);
+            near = near.min(distance - around);
+            far = far.max(distance + around);
+        }
+        if far.is_nan() || far <= 0.0 {
+            return bad("has the whole scene behind it".into(), "choose another one");
+        }
+        // Something flat still needs a depth range.
+        let far = far * 1.001;
+        let near = (near * 0.999).max(far * NEAREST_AMONG);
+        let focal = [0, 1].map(|i| self.focal[i] * scale[i]);
+        let principal = [0, 1].map(|i| self.principal[i] * scale[i]);
+        let size = [f64::from(width), f64::from(height)];
+        let to_view = DMat4::from_mat3(DMat3::from_cols(right, up, back).transpose())
+            * DMat4::from_translation(-eye);
+        let off = [0, 1].map(|i| 2.0 * principal[i] / size[i] - 1.0);
+        let projection = DMat4::from_cols(
+            DVec4::new(2.0 * focal[0] / size[0], 0.0, 0.0, 0.0),
+            DVec4::new(0.0, 2.0 * focal[1] / size[1], 0.0, 0.0),
+            DVec4::new(-off[0], off[1], -far / (far - near), -1.0),
+            DVec4::new(0.0, 0.0, -far * near / (far - near), 0.0),
+        );
+        Ok(Camera {
+            to_clip: projection * to_view,
+            right,
+            up,
+            back,
+            eye: Some(eye),
+            size,
+            focal,
+            principal,
+            origin: eye,
+            range: [near, far],
+            view: View {
+                projection: Projection::Perspective,
+                near,
+                far,
+                world_to_view: to_view.to_cols_array(),
+                view_to_clip: projection.to_cols_array(),
+            },
+            description: format!("camera {}", self.name),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::capture::CameraOptions;
+    use crate::scene::{Mesh, Shape};
+    use glam::Vec3;
+
+    fn pose() -> Pose {
+        Pose {
+            name: "one".into(),
+            eye: DVec3::new(1.0, 2.0, -5.0),
+            axes: [DVec3::X, DVec3::Y, DVec3::Z],
+            focal: [100.0, 90.0],
+            principal: [30.0, 40.0],
+            size: [80, 60],
+        }
+    }
+
+    fn scene() -> Scene {
+        let corner = |i: u32| Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32);
+        let mesh = Mesh {
+            positions: (0..8).map(corner).collect(),
+            triangles: (0..6).map(|i| [i, i + 1, i + 2]).collect(),
+            ..Mesh::default()
+        };
+        let mut scene = Scene::default();
+        scene.add("cube", Shape::Mesh(mesh));
+        scene
+    }
+
+    fn camera(pose: Pose, scene: &Scene, size: [u32; 2]) -> Result<Camera> {
+        let options = CameraOptions { pose: Some(pose), ..CameraOptions::default() };
+        Camera::frame(scene, &options, size[0], size[1])
+    }
+
+    #[test]
+    fn a_pose_projects_as_a_pinhole_does() {
+        let scene = scene();
+        for scale in [1, 2] {
+            let camera = camera(pose(), &scene, [80 * scale, 60 * scale]).unwrap();
+            for (point, _) in scene.bounding_points() {
+                let p = point - pose().eye;
+                let pixel = [
+                    (100.0 * p.x / p.z + 30.0) * f64::from(scale),
+                    (90.0 * p.y / p.z + 40.0) * f64::from(scale),
+                ];
+                let clip = camera.to_clip * point.extend(1.0);
+                let drawn = [
+                    (clip.x / clip.w + 1.0) * camera.size[0] / 2.0,
+                    (1.0 - clip.y / clip.w) * camera.size[1] / 2.0,
+                ];
+                let seen = camera.seen(point);
+                let told = [0, 1].map(|i| camera.focal[i] * seen[i] / seen.z + camera.principal[i]);
+                for i in 0..2 {
+                    assert!((drawn[i] - pixel[i]).abs() < 1e-9, "{drawn:?} {pixel:?}");
+                    assert!((told[i] - pixel[i]).abs() < 1e-9, "{told:?} {pixel:?}");
+                }
+                assert!((camera.depth(seen.z) - clip.z / clip.w).abs() < 1e-9);
+                assert!((0.0..=1.0).contains(&camera.depth(seen.z)));
+            }
+            assert!(camera.view().is_some());
+        }
+    }
+
+    #[test]
+    fn what_is_no_camera_is_told() {
+        let says = |pose: Pose, part: &str| {
+            let error = camera(pose, &scene(), [80, 60]).unwrap_err().to_string();
+            assert!(error.contains(part) && error.contains("'one'"), "{error}");
+        };
+        says(Pose { axes: [DVec3::X, DVec3::X, DVec3::Z], ..pose() }, "right angles");
+        says(Pose { axes: [DVec3::X, -DVec3::Y, DVec3::Z], ..pose() }, "right angles");
+        says(Pose { focal: [0.0, 1.0], ..pose() }, "lens");
+        says(Pose { size: [60, 80], ..pose() }, "shape");
+        says(Pose { eye: DVec3::new(0.0, 0.0, 9.0), ..pose() }, "behind");
+    }
+}

@@ -1,0 +1,144 @@
+//! Meshes in PLY files: vertices with colours, normals and texture coordinates, and faces.
+
+use std::path::Path;
+
+use glam::{DAffine3, DVec3, Vec2, Vec3, Vec4};
+
+use super::{Element, Place};
+use crate::scene::polygon::{Corner, Cutter};
+use crate::scene::{AlphaMode, Material, Mesh, Scene, Shape, far, file_name};
+use screendoor_trace::error::{Error, Result};
+use screendoor_trace::picture::srgb;
+
+/// Names that programs give a face's corners, texture coordinates and colours.
+const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
+const UVS: [[&str; 2]; 4] = [["s", "t"], ["u", "v"], ["texture_u", "texture_v"], ["tx", "ty"]];
+const COLOURS: [[&str; 3]; 2] =
+    [["red", "green", "blue"], ["diffuse_red", "diffuse_green", "diffuse_blue"]];
+
+/// The mesh of a file's elements; `None` where there is no element of faces.
+pub(super) fn scene(path: &Path, elements: &[Element<'_>]) -> Result<Option<Scene>> {
+    let place = path.display().to_string();
+    let find = |name: &str| elements.iter().find(|e| e.name == name);
+    if find("tristrips").is_some() {
+        let hint = "save it with faces";
+        return Err(Error::unsupported(&place, "its triangles are in strips ('tristrips')", hint));
+    }
+    let (Some(vertices), Some(faces)) = (find("vertex"), find("face")) else { return Ok(None) };
+    let corners = faces.lists().iter().find(|list| CORNERS.contains(&list.name.as_str()));
+    let Some(corners) = corners else {
+        let what = format_args!("its faces have no list '{}'", CORNERS.join("' or '"));
+        return Err(Error::invalid(&place, what, "export it again"));
+    };
+    let Some(positions) = columns(vertices, ["x", "y", "z"]) else {
+        return Err(Error::invalid(&place, "its vertices lack x, y or z", "export it again"));
+    };
+    let at = |i: usize| DVec3::from(positions.map(|column| vertices.value(i, column)));
+    let origin = far::origin((0..vertices.count).map(at));
+    let own = |i: usize| (at(i) - origin).as_vec3();
+    let mut mesh = Mesh { positions: (0..vertices.count).map(own).collect(), ..Mesh::default() };
+    let real = |i: usize, column: Place| vertices.value(i, column) as f32;
+    if let Some(normals) = columns(vertices, ["nx", "ny", "nz"]) {
+        let normal = |i| Vec3::from(normals.map(|column| real(i, column)));
+        mesh.normals = (0..vertices.count).map(normal).collect();
+    }
+    if let Some(uvs) = UVS.into_iter().find_map(|names| columns(vertices, names)) {
+        // PLY's writers count v upwards.
+        let uv = |i| Vec2::new(real(i, uvs[0]), 1.0 - real(i, uvs[1]));
+        mesh.uvs = (0..vertices.count).map(uv).collect();
+    }
+    mesh.colours = colours(vertices);
+
+    let mut cutter = Cutter::default();
+    let mut points = Vec::new();
+    for (face, list) in corners.rows().enumerate() {
+        let mut polygon = Vec::with_capacity(list.len());
+        for index in list {
+            let known = (0.0..vertices.count as f64).contains(index) && index.fract() == 0.0;
+            if !known {
+                let what = format!("it has {} vertices and names vertex {index}", vertices.count);
+                let place = format!("{place}, face {face}");
+                return Err(Error::invalid(place, what, "correct the indices"));
+            }
+            polygon.push(*index as usize);
+        }
+        points.clear();
+        points.extend(polygon.iter().map(|i| at(*i)));
+        let triangles = cutter.triangulate(&points).map_err(|_| {
+            let what = format!(
+                "a face of {} corners that is not convex or crosses itself too often",
+                list.len()
+            );
+            let hint = "divide it into polygons of fewer than 65536 corners";
+            Error::unsupported(format!("{place}, face {face}"), what, hint)
+        })?;
+        for triangle in triangles {
+            let corner = |corner| match corner {
+                Corner::Own(i) => polygon[i] as u32,
+                Corner::OnEdge(i, share) => {
+                    let ends = [i, (i + 1) % polygon.len()].map(|i| polygon[i]);
+                    between(&mut mesh, ends, share as f32)
+                }
+            };
+            let triangle = triangle.map(corner);
+            mesh.triangles.push(triangle);
+        }
+    }
+    let see_through = mesh.colours.iter().any(|c| c.w < 1.0);
+    let mut scene = Scene {
+        source: file_name(path),
+        files: vec![path.to_path_buf()],
+        materials: vec![Material {
+            name: "mesh".into(),
+            alpha_mode: if see_through { AlphaMode::Blend } else { AlphaMode::Opaque },
+            ..Material::default()
+        }],
+        ..Scene::default()
+    };
+    if COLOURS.iter().any(|names| columns(faces, *names).is_some()) {
+        let what = "its faces' own colours are not read; vertices' are";
+        scene.warnings.push(format!("{place}: {what}"));
+    }
+    scene.add("mesh", Shape::Mesh(mesh));
+    scene.objects[0].place = DAffine3::from_translation(origin);
+    Ok(Some(scene))
+}
+
+/// The properties of these names, where all are there.
+fn columns<const N: usize>(of: &Element<'_>, names: [&str; N]) -> Option<[Place; N]> {
+    let found = names.map(|name| of.column(name));
+    found.iter().all(Option::is_some).then(|| found.map(|c| c.expect("all are there")))
+}
+
+/// Linear colours and alphas; empty where there are none. Whole numbers are shares of the
+/// greatest that their type holds, encoded as in pictures.
+fn colours(vertices: &Element<'_>) -> Vec<Vec4> {
+    let rgb = COLOURS.into_iter().find_map(|names| columns(vertices, names));
+    let alpha = vertices.column("alpha");
+    if rgb.is_none() && alpha.is_none() {
+        return Vec::new();
+    }
+    let share = |i: usize, column: Place| {
+        (vertices.value(i, column) / vertices.greatest(column)).clamp(0.0, 1.0)
+    };
+    let colour = |i: usize| {
+        let rgb = rgb.map_or([1.0; 3], |rgb| rgb.map(|c| srgb::decode(share(i, c)) as f32));
+        Vec3::from(rgb).extend(alpha.map_or(1.0, |c| share(i, c) as f32))
+    };
+    (0..vertices.count).map(colour).collect()
+}
+
+/// Adds a vertex on the edge between two; its number.
+fn between(mesh: &mut Mesh, [a, b]: [usize; 2], share: f32) -> u32 {
+    mesh.positions.push(mesh.positions[a].lerp(mesh.positions[b], share));
+    if !mesh.normals.is_empty() {
+        mesh.normals.push(mesh.normals[a].lerp(mesh.normals[b], share));
+    }
+    if !mesh.uvs.is_empty() {
+        mesh.uvs.push(mesh.uvs[a].lerp(mesh.uvs[b], share));
+    }
+    if !mesh.colours.is_empty() {
+        mesh.colours.push(mesh.colours[a].lerp(mesh.colours[b], share));
+    }
+    mesh.positions.len() as u32 - 1
+}

@@ -1,0 +1,32 @@
+//! PLY files: Gaussian splats as they are trained or as PlayCanvas compresses them, or a mesh.
+
+mod elements;
+mod mesh;
+
+use std::path::Path;
+
+use self::elements::elements;
+pub(super) use self::elements::{Element, Place};
+use crate::scene::bytes::Bytes;
+use crate::scene::{Axes, Scene, file, splat_file};
+use screendoor_trace::error::Result;
+
+/// Loads the PLY file at `path`.
+pub(super) fn load(path: &Path) -> Result<Scene> {
+    let content = file::read(path)?;
+    let place = path.display().to_string();
+    let elements = elements(&place, &content)?;
+    if let Some(cloud) = splat_file::compressed(&place, &elements)? {
+        return cloud.scene(path, Axes::YDown);
+    }
+    if let Some(cloud) = splat_file::trained(&place, &elements)? {
+        return cloud.scene(path, Axes::YDown);
+    }
+    if let Some(scene) = mesh::scene(path, &elements)? {
+        return Ok(scene);
+    }
+    Err(Bytes::new(&place, &content).unsupported(
+        "it holds neither Gaussian splats nor faces of a mesh",
+        "give splats with f_dc_0, scale_0 and rot_0 or packed as PlayCanvas does, or a mesh with faces",
+    ))
+}
