@@ -7,7 +7,8 @@ use clap::Args;
 use serde::Serialize;
 
 use crate::capture::{
-    CameraOptions, Capture, CaptureOptions, Faces, Order, PatternKind, Poses, SplatRules, Unseen,
+    CameraOptions, Capture, CaptureOptions, Faces, Order, PatternKind, Pose, Poses, SplatRules,
+    Unseen,
 };
 use crate::cli::arguments::{self, colour, numbers, option, samples, size};
 use crate::cli::console::{Console, grouped, shown, table};
@@ -27,8 +28,8 @@ use crate::trace::{
 /// Draw a scene and record its fragments as a trace
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// A .obj, .gltf, .glb, .ply, .vdb or .tfx file, Gaussian splats as .ply, .splat or .spz, or
-    /// builtin:NAME[:parameter=value,…] ('screendoor scenes' lists them)
+    /// A .obj, .gltf, .glb, .ply, .stl, .vdb, .tfx or .hair file, Gaussian splats as .ply, .splat
+    /// or .spz, or builtin:NAME[:parameter=value,…] ('screendoor scenes' lists them)
     scene: OsString,
     /// The trace to write
     #[arg(long, short, value_name = "TRACE")]
@@ -79,9 +80,10 @@ pub(super) struct Arguments {
     /// Camera: vertical field of view in degrees; 0 for parallel lines
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
     fov: Option<f64>,
-    /// Camera: the first, or that of --camera-name, of a cameras.json or transforms.json, in the
-    /// space of the scene's file
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["angle", "distance", "fov"])]
+    /// Camera: one of the scene's own (glTF) by its name or its number from 0; or the first, or
+    /// that of --camera-name, of a cameras.json or transforms.json, in the space of the scene's
+    /// file
+    #[arg(long, value_name = "NAME|FILE", conflicts_with_all = ["angle", "distance", "fov"])]
     camera: Option<PathBuf>,
     /// Camera: which of --camera, by its picture's name or its number from 0
     #[arg(long, value_name = "NAME", requires = "camera")]
@@ -149,18 +151,18 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     // A misspelt name and a machine without a GPU are told before anything is done.
     scene::check(source)?;
     let splats = SplatRules::parse(&arguments.splat_rules)?;
-    let poses = arguments.camera.as_deref().map(|path| {
+    let poses = arguments.camera.as_deref().filter(|name| Poses::is_file(name)).map(|path| {
         let (width, height) = arguments.size.unwrap_or(DEFAULT_SIZE);
         Poses::read(path, [width, height])
     });
     let poses = poses.transpose()?;
     let pose = poses.as_ref().map(|all| all.choose(arguments.camera_name.as_deref()));
-    let pose = pose.transpose()?.cloned();
+    let mut pose = pose.transpose()?.cloned();
     let gpu = arguments.gpu.then(|| Gpu::open(arguments.adapter.as_deref())).transpose()?;
     let inputs: Vec<&Path> = path
         .into_iter()
         .chain(arguments.texture.as_deref())
-        .chain(arguments.camera.as_deref())
+        .chain(arguments.camera.as_deref().filter(|name| Poses::is_file(name)))
         .collect();
     let outputs: Vec<&Path> =
         [&*arguments.output].into_iter().chain(arguments.json.path()).collect();
@@ -183,6 +185,15 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     check_scene(&scene, &outputs)?;
     if arguments.white {
         scene.whiten();
+    }
+    if let Some(name) = arguments.camera.as_deref().filter(|name| !Poses::is_file(name)) {
+        if arguments.camera_name.is_some() {
+            let what = "--camera-name is for a file of cameras";
+            return Err(Error::config(what, "name the scene's own camera by --camera alone"));
+        }
+        let (width, height) = arguments.size.unwrap_or(DEFAULT_SIZE);
+        let name = name.to_string_lossy();
+        pose = Some(Pose::of_file(&scene.cameras, &name, [width, height])?);
     }
     let own_size = pose.as_ref().map(|pose| (pose.size[0], pose.size[1]));
     let (width, height) = arguments.size.or(own_size).unwrap_or(DEFAULT_SIZE);

@@ -5,6 +5,7 @@
 
 use std::collections::HashMap;
 use std::fs;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -17,6 +18,8 @@ use arrow_ipc::CompressionType;
 use arrow_ipc::reader::FileReader;
 use arrow_ipc::writer::{FileWriter, IpcWriteOptions, StreamWriter};
 use arrow_schema::{Field, Schema};
+use flate2::Compression;
+use flate2::write::GzEncoder;
 use screendoor::capture::{Capture, CaptureOptions};
 use screendoor::trace::{Header, Trace, WriteOptions};
 
@@ -495,8 +498,8 @@ fn scenes() -> Vec<Hostile> {
         text(
             "mesh.ply",
             "ply\nformat ascii 1.0\nelement vertex 0\nend_header\n",
-            "stored as ascii",
-            "a PLY file of text",
+            "neither Gaussian splats nor faces",
+            "a PLY file of nothing",
         ),
         text(
             "many.ply",
@@ -523,7 +526,50 @@ fn scenes() -> Vec<Hostile> {
             says: "needs 4294967295",
             what: "a name 4 GiB long",
         },
-        text("scene.stl", "solid\n", "do not come as '.stl'", "another format"),
+        text("scene.fbx", "solid\n", "do not come as '.fbx'", "another format"),
+        text(
+            "list.ply",
+            "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
+             property float z\nelement face 1\nproperty list uint int vertex_indices\n\
+             end_header\n0 0 0\n4294967295 0 0 0\n",
+            "ends within its element 'face'",
+            "a face of 2^32 - 1 corners in 3 numbers",
+        ),
+        Hostile {
+            name: "many.splat",
+            bytes: vec![0x7f; 33],
+            says: "33 bytes, and splats of 32",
+            what: "a splat and a byte",
+        },
+        Hostile {
+            name: "many.spz",
+            bytes: [&b"NGSP\x04\0\0\0\xff\xff\xff\xff\x04\x0c\0\x06"[..], &[0; 16]].concat(),
+            says: "claims 4294967295 splats in 32 bytes",
+            what: "2^32 - 1 splats of degree 4 in no bytes",
+        },
+        Hostile {
+            name: "bomb.spz",
+            bytes: {
+                let mut packed = GzEncoder::new(Vec::new(), Compression::best());
+                packed.write_all(b"NGSP\x02\0\0\0\x00\x08\0\0\x03\x0c\0\0").unwrap();
+                packed.write_all(&vec![0; 1 << 20]).unwrap();
+                packed.finish().unwrap()
+            },
+            says: "after its last array",
+            what: "2048 splats, and a MiB that packs into a KiB",
+        },
+        Hostile {
+            name: "many.hair",
+            bytes: [&b"HAIR\x01\0\0\0\0\0\0\x04\x1e\0\0\0\xff\xff\xff\x03"[..], &[0; 108]].concat(),
+            says: "needs 805306368",
+            what: "2^26 points of hair in no bytes",
+        },
+        Hostile {
+            name: "many.stl",
+            bytes: [&[0; 80][..], &[0xff; 4], &[0; 50]].concat(),
+            says: "its 4294967295 triangles take 214748364834 bytes, and it has 134",
+            what: "2^32 - 1 triangles in the bytes of one",
+        },
     ]
 }
 

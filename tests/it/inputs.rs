@@ -22,13 +22,17 @@ pub struct Input {
 }
 
 /// All of them.
-pub const INPUTS: [Input; 9] = [
+pub const INPUTS: [Input; 13] = [
     Input { name: "trace", take: trace },
     Input { name: "study", take: study },
     Input { name: "gltf", take: |bytes| scene("gltf", bytes) },
     Input { name: "glb", take: |bytes| scene("glb", bytes) },
     Input { name: "obj", take: obj },
     Input { name: "ply", take: |bytes| scene("ply", bytes) },
+    Input { name: "splat", take: |bytes| scene("splat", bytes) },
+    Input { name: "spz", take: |bytes| scene("spz", bytes) },
+    Input { name: "stl", take: |bytes| scene("stl", bytes) },
+    Input { name: "hair", take: |bytes| scene("hair", bytes) },
     Input { name: "tfx", take: |bytes| scene("tfx", bytes) },
     Input { name: "vdb", take: |bytes| scene("vdb", bytes) },
     Input { name: "picture", take: picture },

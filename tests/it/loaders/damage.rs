@@ -6,7 +6,7 @@ use screendoor::random::Stream;
 use serde_json::json;
 
 use super::gltf::textured;
-use super::{folder, load_in, png, splats, tfx, vdb};
+use super::{folder, hair, load_in, png, splats, tfx, vdb};
 use crate::hostile;
 
 /// Changes a file as damage does: bytes changed, cut out, doubled, or words swapped
@@ -92,17 +92,19 @@ pub fn good_files() -> Vec<(&'static str, Vec<u8>)> {
         j["images"] = json!([{ "bufferView": 0, "mimeType": "image/png" }, { "uri": "a.png" }]);
     });
     let glb = glb(&full);
-    let hair = tfx::tfx(4, 8, |_| ());
+    let tressfx = tfx::tfx(4, 8, |_| ());
     let packed = vdb::Written { packing: 6, half: true, ..vdb::full() }.bytes();
     let zipped = vdb::Written { packing: 3, tile: Some(0.5), ..vdb::full() }.bytes();
     let packed_splats = splats::splats(&[[0x1234_5678, 0x4567_89ab, 0x89ab_cdef, 0xffee_ddcc]; 20]);
     vec![
-        ("a.tfx", hair),
+        ("a.tfx", tressfx),
         ("a.ply", packed_splats),
         ("b.ply", splats::trained("ascii")),
         ("c.ply", splats::trained("binary_little_endian")),
         ("d.ply", splats::MESH.into()),
         ("a.splat", splats::packed()),
+        ("a.hair", hair::hair(31, |_| ())),
+        ("a.stl", hair::stl(0)),
         ("a.spz", splats::spz(2, true)),
         ("b.spz", splats::spz(4, false)),
         ("b.vdb", packed),
@@ -122,7 +124,7 @@ fn damaged_files_load_or_give_one_error() {
     let folder = folder(&good);
     for name in [
         "a.obj", "a.gltf", "a.glb", "a.tfx", "a.ply", "b.ply", "c.ply", "d.ply", "a.splat",
-        "a.spz", "b.spz", "b.vdb", "c.vdb",
+        "a.hair", "a.stl", "a.spz", "b.spz", "b.vdb", "c.vdb",
     ] {
         load_in(folder.path(), name).unwrap_or_else(|e| panic!("{name}: {e}"));
     }

@@ -2,6 +2,7 @@
 
 pub mod damage;
 mod gltf;
+mod hair;
 mod inputs;
 mod obj;
 mod outside;

@@ -8,6 +8,7 @@ use image::ImageFormat;
 use screendoor::error::Error;
 use screendoor::scene::{Scene, Shape};
 
+use super::hair::{self, stl};
 use super::inputs::at;
 use super::pictures::{encoded, with_packed};
 use super::splats::{self, splats};
@@ -588,11 +589,15 @@ fn texture_cases() -> Vec<Case> {
 
 fn other_cases() -> Vec<Case> {
     let ply = |feature, does| Case { section: "PLY", feature, does };
-    let hair = |feature, does| Case { section: "TressFX", feature, does };
+    let tressfx = |feature, does| Case { section: "TressFX", feature, does };
     let vdb = |feature, does| Case { section: "OpenVDB", feature, does };
     let file = |name: &'static str, bytes: Vec<u8>| -> Files { vec![(name, bytes)] };
     let written = |written: Written| file("a.vdb", written.bytes());
     let splat = |feature, does| Case { section: "Splats", feature, does };
+    let of_stl = |feature, does| Case { section: "STL", feature, does };
+    let of_hair = |feature, does| Case { section: "Hair", feature, does };
+    let mut single = hair::hair(3, |_| ());
+    single[128..132].copy_from_slice(&[3, 0, 0, 0]);
     let edited = |from: &str, to: &str| file("a.ply", splats::MESH.replace(from, to).into());
     let trained = |from: &str, to: &str| {
         let text = String::from_utf8(splats::trained("ascii")).unwrap().replace(from, to);
@@ -678,7 +683,22 @@ fn other_cases() -> Vec<Case> {
             "`.spz` of versions 1 to 3 that is not compressed",
             Says(file("a.spz", raw), "not compressed by gzip"),
         ),
-        hair(
+        of_stl(
+            "text, bytes",
+            Shows(file("a.stl", stl(0)), |scene| assert_eq!(mesh(scene, 0).triangles.len(), 2)),
+        ),
+        of_stl("colours", Says(file("a.stl", stl(7)), "say of colours")),
+        of_hair(
+            "segments, points, thicknesses, transparencies, colours, and defaults in their place",
+            Shows(file("a.hair", hair::hair(31, |_| ())), |scene| {
+                assert_eq!(hair::strands(scene).colours.len(), 5);
+            }),
+        ),
+        of_hair(
+            "strands of a single point",
+            Says(file("a.hair", single), "1 strands of a single point"),
+        ),
+        tressfx(
             "points of strands",
             Shows(file("a.tfx", tfx(3, 4, |_| ())), |scene| {
                 let Shape::Strands(strands) = &scene.shapes[0] else { panic!() };
@@ -686,9 +706,9 @@ fn other_cases() -> Vec<Case> {
                 assert_eq!(scene.materials[0].base.w, 0.5);
             }),
         ),
-        hair("thicknesses, colours", Says(thick(6), "thicknesses are not read")),
-        hair("texture coordinates", Like(thick(4), thick(5))),
-        hair(
+        tressfx("thicknesses, colours", Says(thick(6), "thicknesses are not read")),
+        tressfx("texture coordinates", Like(thick(4), thick(5))),
+        tressfx(
             "other versions than 4",
             Says(file("a.tfx", tfx(3, 4, |head| head[0] = 3.0_f32.to_bits())), "TressFX version 3"),
         ),

@@ -172,6 +172,8 @@ fn strand_triangle(
     let point = segment as usize + curve;
     let at = |i: usize| place.transform_point3(strands.points[i].as_dvec3());
     let scale = place.matrix3.determinant().abs().cbrt();
+    // Curves have two points at least, so that it is clear which of both there is one for.
+    let own = |i: usize| if strands.colours.len() == strands.points.len() { i } else { curve };
     let vertex = |i: usize, side: f64| {
         // The curve's direction at a joint: from the point before to the point after.
         let along = at((i + 1).min(end - 1)) - at(i.max(first + 1) - 1);
@@ -183,7 +185,7 @@ fn strand_triangle(
             normal: (towards + across * (side * RIBBON_ROUNDNESS)).as_vec3(),
             uvs: [Vec2::new(side as f32 * 0.5 + 0.5, (i - first) as f32 / (end - 1 - first) as f32);
                 2],
-            colour: strands.colours.get(curve).copied().unwrap_or(Vec4::ONE),
+            colour: strands.colours.get(own(i)).copied().unwrap_or(Vec4::ONE),
         }
     };
     let (low, high) = (point, point + 1);

@@ -2,7 +2,7 @@
 //! and from built-in generators.
 //!
 //! A scene knows nothing of pixels. [`load`] takes either the name of a file
-//! (OBJ, glTF, GLB, PLY, OpenVDB, TressFX, Gaussian splats) or `builtin:NAME`.
+//! (OBJ, glTF, GLB, PLY, STL, OpenVDB, hair, Gaussian splats) or `builtin:NAME`.
 
 mod axes;
 pub mod builtin;
@@ -11,6 +11,7 @@ mod far;
 mod file;
 mod folder;
 mod gltf_file;
+mod hair_file;
 mod image_file;
 mod material;
 mod obj_file;
@@ -21,6 +22,7 @@ mod source;
 mod splat_file;
 mod splats;
 mod sprite;
+mod stl_file;
 mod texture;
 mod tfx_file;
 mod vdb_file;
@@ -61,6 +63,8 @@ pub struct Scene {
     pub textures: Vec<Texture>,
     /// From where it is best seen.
     pub view: View,
+    /// The cameras that its file has.
+    pub cameras: Vec<FileCamera>,
     /// From the space of its file, in which cameras given beside it stand, to the scene's.
     pub world: DAffine3,
     /// Which way its file has up, by habit.
@@ -69,6 +73,17 @@ pub struct Scene {
     pub files: Vec<PathBuf>,
     /// What could not be honoured, for the user to know.
     pub warnings: Vec<String>,
+}
+
+/// A camera that a scene's file has.
+#[derive(Clone, Debug)]
+pub struct FileCamera {
+    /// Its name, for people.
+    pub name: String,
+    /// From its own space, where it looks along −z with y up, to that of the file.
+    pub place: DAffine3,
+    /// From top to bottom, in radians; `None` where its lines of sight are parallel.
+    pub field_of_view: Option<f64>,
 }
 
 /// A shape at its place in the scene.
@@ -186,7 +201,8 @@ pub struct Strands {
     pub points: Vec<Vec3>,
     /// Half of the ribbon's width at each point.
     pub radii: Vec<f32>,
-    /// Linear colours, one for each curve, multiplied into the material's.
+    /// Linear colours and alphas, one for each curve or one for each point, multiplied into the
+    /// material's.
     pub colours: Vec<Vec4>,
     /// The first point of each curve, and at the end the number of points; each
     /// curve has at least two.
@@ -546,6 +562,8 @@ pub fn load_with(source: &str, options: &LoadOptions) -> Result<Scene> {
                 "gltf" | "glb" => gltf_file::load(path, &folder)?,
                 "vdb" => vdb_file::load(path, options.grid.as_deref())?,
                 "ply" => ply_file::load(path)?,
+                "hair" => hair_file::load(path)?,
+                "stl" => stl_file::load(path)?,
                 "splat" => splat_file::load_packed(path)?,
                 "spz" => splat_file::load_spz(path)?,
                 "tfx" => tfx_file::load(path)?,

@@ -24,7 +24,8 @@ pub fn seen_from(source: &str, base: &Path) -> String {
 }
 
 /// The endings of the files that scenes come as.
-pub const ENDINGS: [&str; 8] = ["obj", "gltf", "glb", "vdb", "tfx", "ply", "splat", "spz"];
+pub const ENDINGS: [&str; 10] =
+    ["obj", "gltf", "glb", "ply", "stl", "vdb", "tfx", "hair", "splat", "spz"];
 
 /// Whether it may be asked which way is up in files of that ending: in glTF it is y.
 pub(super) fn may_say_up(ending: &str) -> bool {

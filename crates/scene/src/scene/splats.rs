@@ -10,6 +10,8 @@ const REACH: f32 = 3.0;
 /// The share of splats at each end of each axis that a camera's frame need not hold: trainings
 /// leave some far outside.
 const OUTSIDE: f64 = 0.01;
+/// A splat's reach beyond its mean that a frame holds, as a share of what all means take.
+const FAINT: f32 = 0.02;
 
 /// 3D Gaussians with colours that change with the direction they are seen from (Kerbl et al.
 /// 2023). One of an opacity of 0 shows nothing and keeps its number.
@@ -110,7 +112,7 @@ impl Splats {
         // A large one reaches beyond the others, faintly.
         let least = move |(mean, reach): (Vec3, f32)| {
             let room = ends.iter().map(|[low, high]| high - low).fold(0.0, f32::max);
-            (mean, if room > 0.0 { reach.min(room / 2.0) } else { reach })
+            (mean, if room > 0.0 { reach.min(room * FAINT) } else { reach })
         };
         self.shown().filter(move |i| inside(self.means[*i])).map(move |i| least(self.point(i)))
     }

@@ -8,9 +8,9 @@ use serde::{Deserialize, Serialize};
 use crate::study::engine::EngineName;
 use screendoor_designs::{Configured, configure};
 use screendoor_scene::capture::{
-    CameraOptions, CaptureOptions, Faces, Order, PatternKind, Poses, SplatRules, pattern,
+    CameraOptions, CaptureOptions, Faces, Order, PatternKind, Pose, Poses, SplatRules, pattern,
 };
-use screendoor_scene::scene::{self, Axes, LoadOptions, Scene};
+use screendoor_scene::scene::{self, Axes, FileCamera, LoadOptions, Scene};
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::param::Options;
 use screendoor_trace::picture::Space;
@@ -145,8 +145,9 @@ pub struct SceneEntry {
     /// Camera: vertical field of view in degrees; 0 for parallel lines.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fov: Option<f64>,
-    /// In place of all three, a file of cameras, seen from the study file's folder: the first of
-    /// them, or `camera_name`.
+    /// In place of all three, one of the scene's own cameras (glTF) by its name or its number
+    /// from 0; or a `.json` file of cameras, seen from the study file's folder: the first of them,
+    /// or `camera_name`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<String>,
     /// Which of them, by its picture's name or its number from 0.
@@ -360,12 +361,16 @@ impl SceneEntry {
         scene::load_with(&scene::seen_from(source, base), &options)
     }
 
-    /// How it is captured; paths are seen from the folder `base`.
+    /// How it is captured, where its file has these cameras; paths are seen from the folder
+    /// `base`.
     ///
     /// # Errors
-    /// As [`Poses::read`], [`Poses::choose`] and [`SplatRules::parse`].
-    pub fn options(&self, base: &Path) -> Result<CaptureOptions> {
+    /// As [`Poses::read`], [`Poses::choose`], [`Pose::of_file`] and [`SplatRules::parse`].
+    pub fn options(&self, base: &Path, cameras: &[FileCamera]) -> Result<CaptureOptions> {
         let pose = self.camera.as_ref().map(|path| {
+            if !Poses::is_file(Path::new(path)) {
+                return Pose::of_file(cameras, path, self.size);
+            }
             let poses = Poses::read(&base.join(path), self.size)?;
             poses.choose(self.camera_name.as_deref()).cloned()
         });

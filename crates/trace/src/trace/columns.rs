@@ -32,16 +32,16 @@ macro_rules! columns {
                 Dzdy dzdy: Column<i32>, [depth.dzdy], anything,
                     "the same, per pixel down", "the depth plane's slope";
                 R r: ChannelColumn, [colour[0]], finite_colour,
-                    "linear, finite, not multiplied by alpha", "red";
+                    "finite, not multiplied by alpha; linear, or as `screendoor.space` says", "red";
                 G g: ChannelColumn, [colour[1]], finite_colour,
-                    "linear, finite, not multiplied by alpha", "green";
+                    "finite, not multiplied by alpha; linear, or as `screendoor.space` says", "green";
                 B b: ChannelColumn, [colour[2]], finite_colour,
-                    "linear, finite, not multiplied by alpha", "blue";
+                    "finite, not multiplied by alpha; linear, or as `screendoor.space` says", "blue";
                 Alpha alpha: Column<f32>, [alpha], unit_interval,
                     "0 to 1", "opacity";
                 Primitive primitive: Column<u32>, [primitive], anything,
                     "number",
-                    "the triangle's number in the scene: different triangles that meet in a pixel must have different numbers, as designs draw randomness from it";
+                    "the triangle's or splat's number in the scene: different ones that meet in a pixel must have different numbers, as designs draw randomness from it";
                 Object object: Column<u32>, [object], anything,
                     "number", "the object's number in the scene";
             }

@@ -300,7 +300,7 @@ pub fn cases() -> Vec<Case> {
                     "perspective": { "yfov": 1, "znear": 1 } }]);
                 m.json["nodes"][0]["camera"] = 0.into();
             },
-            white,
+            |s| white(s) && s.cameras[0].field_of_view == Some(1.0),
         ),
         told("Several scenes", "of its 2 scenes only 'main' is drawn (1 other scene)", |m| {
             m.json["scenes"] = json!([{ "nodes": [] }, { "nodes": [0], "name": "main" }]);

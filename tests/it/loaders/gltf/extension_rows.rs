@@ -9,7 +9,7 @@ use super::table::{Case, GREEN, RED, case, told, white, x_of};
 use crate::loaders::mesh;
 
 /// One splat of that size in place of the mesh.
-fn splats(m: &mut Model, scale: f32) {
+pub fn splats(m: &mut Model, scale: f32) {
     let name = |name: &str| format!("KHR_gaussian_splatting:{name}");
     let mut attributes = serde_json::Map::new();
     attributes.insert("POSITION".into(), m.floats(&[1.0, 2.0, 3.0], "VEC3").into());
@@ -159,25 +159,6 @@ pub fn cases() -> Vec<Case> {
                     && splats.rotations[0].z == 1.0
                     && splats.opacities == [0.25]
                     && (splats.degree, splats.harmonics[3]) == (1, [3.0, 2.0, 1.0])
-            },
-        ),
-        Case {
-            row: "KHR_gaussian_splatting",
-            says: "splats of the kernel 'box' are not drawn (4 splats)",
-            edit: |m| {
-                m.another(0);
-                m.json["meshes"][0]["primitives"][1]["extensions"] =
-                    json!({ "KHR_gaussian_splatting": { "kernel": "box" } });
-            },
-            good: white,
-        },
-        // Scales below 0 are logarithms.
-        case(
-            "KHR_gaussian_splatting",
-            |m| splats(m, -1.0),
-            |s| {
-                let [Shape::Splats(splats)] = &s.shapes[..] else { return false };
-                splats.scales == [Vec3::splat((-1.0_f64).exp() as f32)]
             },
         ),
         case(

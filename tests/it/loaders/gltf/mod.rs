@@ -7,10 +7,12 @@ mod model;
 mod table;
 
 use glam::{Vec2, Vec3};
+use screendoor::capture::{CameraOptions, Capture, CaptureOptions, Pose};
 use screendoor::error::Error;
-use screendoor::scene::Scene;
+use screendoor::scene::{Scene, Shape};
 use serde_json::{Value, json};
 
+use self::model::Model;
 use super::{folder, load_in, mesh, png, warned};
 use crate::hostile;
 use crate::util::endlessly_scaled;
@@ -124,4 +126,60 @@ fn whitening_leaves_opacities_alone() {
     scene.whiten();
     // A fifth of the light goes through what is white now.
     assert!(model::is(model::middle(&scene), [1.0; 3], 0.8));
+}
+
+#[test]
+fn splats_of_drafts_are_read_and_what_is_not_known_is_told() {
+    // Scales below 0 are logarithms.
+    let mut model = Model::quad();
+    extension_rows::splats(&mut model, -1.0);
+    let scene = model.load().unwrap();
+    let [Shape::Splats(splats)] = &scene.shapes[..] else { panic!("{:?}", scene.shapes) };
+    assert_eq!(splats.scales, [glam::Vec3::splat((-1.0_f64).exp() as f32)]);
+    for (key, value, says) in [
+        ("kernel", "box", "splats of the kernel 'box' are not drawn (4 splats)"),
+        ("colorSpace", "other", "splats of the colour space 'other' are not drawn"),
+        ("projection", "fish", "splats of the projection 'fish' are not drawn"),
+        ("kernel", "ellipse", "splats without ROTATION are not drawn"),
+    ] {
+        let mut model = Model::quad();
+        model.another(0);
+        model.json["meshes"][0]["primitives"][1]["extensions"] =
+            json!({ "KHR_gaussian_splatting": { key: value } });
+        warned(&model.load().unwrap(), 1, &[says]);
+    }
+}
+
+#[test]
+fn the_file_s_cameras_see_what_they_are_set_on() {
+    let mut model = Model::quad();
+    let field = |tangent: f64| 2.0 * tangent.atan();
+    model.json["cameras"] = json!([
+        { "type": "perspective", "name": "close", "perspective": { "yfov": field(1.0 / 3.0), "znear": 1 } },
+        { "type": "orthographic", "name": "flat", "orthographic": { "xmag": 1, "ymag": 1, "zfar": 9, "znear": 0 } },
+    ]);
+    let place = json!([0, 0, 3]);
+    model.json["nodes"] = json!([
+        { "mesh": 0 },
+        { "camera": 0, "translation": place },
+        { "camera": 1, "translation": place },
+    ]);
+    model.json["scenes"][0]["nodes"] = json!([0, 1, 2]);
+    let scene = model.load().unwrap();
+    let pose = |name: &str| Pose::of_file(&scene.cameras, name, [16, 16]);
+    // The square fills the frame and ends with it.
+    for name in ["close", "0"] {
+        let camera = CameraOptions { pose: Some(pose(name).unwrap()), ..Default::default() };
+        let options =
+            CaptureOptions { width: 16, height: 16, samples: 4, camera, ..Default::default() };
+        let trace = Capture::new(&scene, &options).unwrap().to_memory(|_, _| ()).unwrap();
+        let batches: Vec<_> = trace.batches().map(Result::unwrap).collect();
+        let covered = batches.iter().flat_map(|b| b.iter()).map(|f| f.coverage.count());
+        assert_eq!(covered.sum::<u32>(), 16 * 16 * 4, "{name}");
+    }
+    for (name, says) in [("flat", "not one in perspective"), ("clos", "close"), ("2", "unknown")] {
+        let error = pose(name).unwrap_err().to_string();
+        assert!(error.contains(says), "{error}");
+    }
+    assert!(Pose::of_file(&[], "a", [16, 16]).unwrap_err().to_string().contains("has none"));
 }

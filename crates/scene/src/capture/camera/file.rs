@@ -77,6 +77,11 @@ pub struct Poses {
 }
 
 impl Poses {
+    /// Whether a camera's name is that of a file of cameras, and not one of the scene's own.
+    pub fn is_file(name: &Path) -> bool {
+        name.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"))
+    }
+
     /// Reads the cameras of the file at `path`. Where it says nothing of its frames' size they
     /// have the size `frame`, in pixels.
     ///

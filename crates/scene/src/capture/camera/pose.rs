@@ -1,9 +1,11 @@
 //! Cameras that stand where they are told.
 
+use std::f64::consts::PI;
+
 use glam::{DMat3, DMat4, DVec3, DVec4};
 
 use crate::capture::camera::{Camera, NEAREST_AMONG};
-use crate::scene::Scene;
+use crate::scene::{FileCamera, Scene};
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::trace::{Projection, View};
 
@@ -30,6 +32,38 @@ pub struct Pose {
 }
 
 impl Pose {
+    /// The camera of a scene's file of that name, or of that number counted from 0, over a frame
+    /// of `size` pixels.
+    ///
+    /// # Errors
+    /// [`Error::Config`] where there is none, or its lines of sight are parallel.
+    pub fn of_file(cameras: &[FileCamera], wanted: &str, size: [u32; 2]) -> Result<Self> {
+        let named = cameras.iter().find(|camera| camera.name == wanted);
+        let numbered = || wanted.parse().ok().and_then(|i: usize| cameras.get(i));
+        let Some(camera) = named.or_else(numbered) else {
+            if cameras.is_empty() {
+                let what = format_args!("there is no camera '{wanted}': the scene's file has none");
+                return Err(Error::config(what, "name a .json file of cameras, or give --angle"));
+            }
+            return Err(Error::unknown("camera", wanted, cameras.iter().map(|c| c.name.as_str())));
+        };
+        let Some(field) = camera.field_of_view.filter(|f| *f > 0.0 && *f < PI) else {
+            let what = format_args!("the camera '{wanted}' is not one in perspective");
+            return Err(Error::config(what, "give --angle and --fov"));
+        };
+        let axes = camera.place.matrix3;
+        let unit = |v: DVec3| v.normalize_or_zero();
+        let focal = f64::from(size[1]) / 2.0 / libm::tan(field / 2.0);
+        Ok(Pose {
+            name: camera.name.clone(),
+            eye: camera.place.translation,
+            axes: [unit(axes.x_axis), unit(-axes.y_axis), unit(-axes.z_axis)],
+            focal: [focal; 2],
+            principal: size.map(|side| f64::from(side) / 2.0),
+            size,
+        })
+    }
+
     /// The camera over a frame of `width` × `height` pixels of the same shape.
     ///
     /// # Errors

@@ -27,6 +27,8 @@ pub(super) struct Root {
     #[serde(default)]
     pub buffer_views: Vec<View>,
     #[serde(default)]
+    pub cameras: Vec<Camera>,
+    #[serde(default)]
     pub images: Vec<Image>,
     #[serde(default)]
     pub materials: Vec<Material>,
@@ -196,6 +198,7 @@ pub(super) struct Node {
     #[serde(default)]
     pub children: Vec<usize>,
     pub mesh: Option<usize>,
+    pub camera: Option<usize>,
     pub skin: Option<usize>,
     pub matrix: Option<[f32; 16]>,
     pub translation: Option<[f32; 3]>,
@@ -220,6 +223,19 @@ pub(super) struct Scene {
 pub(super) struct Skin {
     pub joints: Vec<usize>,
     pub inverse_bind_matrices: Option<usize>,
+}
+
+/// A camera; without a perspective its lines of sight are parallel.
+#[derive(Deserialize)]
+pub(super) struct Camera {
+    pub name: Option<String>,
+    pub perspective: Option<Perspective>,
+}
+
+#[derive(Deserialize)]
+pub(super) struct Perspective {
+    /// From top to bottom, in radians.
+    pub yfov: f64,
 }
 
 #[derive(Deserialize)]

@@ -28,7 +28,7 @@ use self::primitive::{Drawn, Posed};
 use self::texture::TextureKey;
 use self::warnings::{Matter, Warnings};
 use crate::scene::folder::Folder;
-use crate::scene::{Object, Scene, file, file_name};
+use crate::scene::{FileCamera, Object, Scene, file, file_name};
 use screendoor_trace::error::{Error, Result, one_line};
 
 /// The deepest nesting of nodes.
@@ -214,6 +214,14 @@ impl<'a> Loader<'a> {
             depth: above.depth + 1,
             moved: above.moved || self.animated[index],
         };
+        if let Some(camera) = node.camera.and_then(|i| self.root.cameras.get(i)) {
+            let name = camera.name.as_deref().or(node.name.as_deref());
+            self.scene.cameras.push(FileCamera {
+                name: name.map_or(part.clone(), one_line),
+                place: DAffine3::from_mat4(here.place),
+                field_of_view: camera.perspective.as_ref().map(|p| p.yfov),
+            });
+        }
         if let Some(mesh) = node.mesh {
             self.place_mesh(mesh, index, node, here)?;
         }

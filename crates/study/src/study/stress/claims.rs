@@ -57,6 +57,10 @@ pub(super) fn claims(program: &Path) -> Result<Vec<Claim>> {
         "sparse.gltf": "a sparse accessor of 10^12 zeros",
         "outside.gltf": "a buffer outside the scene's folder",
         "many.ply": "10^12 - 1 splats",
+        "list.ply": "a face of 2^32 - 1 corners",
+        "many.spz": "2^32 - 1 splats of degree 4",
+        "bomb.spz": "a MiB that packs into a KiB",
+        "many.hair": "2^26 points of hair",
         "many.tfx": "65025 points of hair",
         "metadata.vdb": "a name of 4 GiB",
     ]

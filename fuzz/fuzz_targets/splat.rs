@@ -1,0 +1,10 @@
+#![no_main]
+
+#[path = "../../tests/it/inputs.rs"]
+mod inputs;
+#[path = "../limit.rs"]
+mod limit;
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
+    inputs::named("splat").take(bytes);
+});
