@@ -77,14 +77,14 @@ struct Part<'a> {
 
 /// Minutes on two processors that the parts take with the default effort, roughly: the tables
 /// (their share grows with the pixels and the seeds), the expectations (with theirs), the
-/// comparison of all designs, and this project's own over many seeds.
-const MINUTES: [f64; 4] = [15.0, 7.0, 25.0, 12.0];
+/// comparison of all designs, this project's own over many seeds, and splats.
+const MINUTES: [f64; 5] = [15.0, 7.0, 25.0, 12.0, 3.0];
 
 /// How long it takes on so many threads, roughly, in minutes.
 fn minutes(effort: Effort, part: Option<Publication>, threads: usize) -> f64 {
     let square = |side: u32, usual: f64| (f64::from(side) / usual).powi(2);
     let seeds = f64::from(effort.seeds) / 4.0;
-    let [tables, means, comparison, beyond] = MINUTES;
+    let [tables, means, comparison, beyond, splats] = MINUTES;
     let of = |own: Publication| part.is_none_or(|only| only == own);
     let mut minutes = 0.0;
     if of(Publication::LaineKarras) {
@@ -99,6 +99,10 @@ fn minutes(effort: Effort, part: Option<Publication>, threads: usize) -> f64 {
     if of(Publication::Beyond) {
         let seeds = f64::from(effort.seeds_of_means) / 128.0;
         minutes += beyond * square(effort.comparison_side, 96.0) * seeds;
+    }
+    if of(Publication::Splats) {
+        let seeds = f64::from(effort.seeds_of_means) / 128.0;
+        minutes += splats * square(effort.comparison_side, 96.0) * seeds;
     }
     minutes * 2.0 / threads as f64
 }

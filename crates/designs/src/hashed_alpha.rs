@@ -6,11 +6,18 @@
 //! not hold places in objects. Here the place is the fragment's in the frame, its
 //! depth scaled to pixels, hashed with its object's number: the same statistics in a
 //! still picture, without the stability that is the method's aim.
+//!
+//! What renderers of Gaussian splats ship is the same test against other numbers (`noise`,
+//! `power`): StochasticSplats, nvpro's sample and Spark hash pixel, sample and primitive, which
+//! is white noise; PlayCanvas (pull request 9443) takes a mask of blue noise, moved for each
+//! primitive along its diagonal, to the power of 2.2. In steps of the mask's texels there are
+//! 32 places, so that more than half of all neighbours in the file share theirs and hide each
+//! other; and the power lets an alpha of 0.1 pass a third of the time.
 
 use screendoor_rop::stochastic::{self, Round, Sampler, Stochastic};
 use screendoor_rop::{
-    Blueprint, Family, Frame, Info, OpaquePromise, OrderPromise, Probe, Promises, Samples, Site,
-    Threshold, colour, depth_bits,
+    Blueprint, Dither, Family, Frame, Info, OpaquePromise, OrderPromise, Probe, Promise, Promises,
+    Samples, Site, TILE, Threshold, colour, depth_bits,
 };
 use screendoor_trace::error::Result;
 use screendoor_trace::param::{Typed, Values};
@@ -25,11 +32,27 @@ screendoor_trace::options! {
     }
 }
 
+screendoor_trace::options! {
+    /// Where the random numbers come from.
+    pub enum Noise {
+        Place = "place": "a hash of where the fragment lies, at two scales, as published",
+        Primitive = "primitive": "a hash of pixel, sample and primitive, as StochasticSplats, nvpro and Spark have it",
+        Mask = "mask": "a mask of blue noise, moved by the primitive to one of 32 places, as PlayCanvas has it",
+    }
+}
+
 /// The design's entry in the registry.
 pub struct HashedAlpha;
 
 const THRESHOLD: Typed<Each> =
     Typed::choice("threshold", "sample", "for what a threshold is computed");
+const NOISE: Typed<Noise> = Typed::choice("noise", "place", "where the random numbers come from");
+const POWER: Typed<f64> = Typed::real(
+    "power",
+    "1",
+    (1.0, 4.0),
+    "the random number to this power is what alpha is compared with; PlayCanvas' is 2.2",
+);
 const SCALE: Typed<f64> = Typed::real("scale", "1", (0.1, 16.0), "cells of the hash, in pixels");
 
 impl Blueprint for HashedAlpha {
@@ -38,14 +61,23 @@ impl Blueprint for HashedAlpha {
         family: Family::Stochastic,
         summary: "an alpha test against a hash of where the fragment lies, at two scales",
         citation: "Wyman, McGuire: Hashed Alpha Testing, I3D 2017",
-        params: &[THRESHOLD.param, SCALE.param, depth_bits::PARAM.param, colour::PARAM.param],
-        combinations: &[],
+        params: &[
+            NOISE.param,
+            POWER.param,
+            THRESHOLD.param,
+            SCALE.param,
+            depth_bits::PARAM.param,
+            colour::PARAM.param,
+        ],
+        combinations: &["noise=mask,power=2.2", "noise=primitive,threshold=pixel"],
     };
 
     type At<const N: usize> = Stochastic<HashedThreshold, N>;
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
         let sampler = HashedThreshold {
+            noise: values.get(NOISE),
+            power: values.get(POWER),
             each: values.get(THRESHOLD),
             scale: values.get(SCALE),
             depth_in_pixels: f64::from(frame.grid.width().max(frame.grid.height()))
@@ -56,11 +88,15 @@ impl Blueprint for HashedAlpha {
 
     fn promises(values: &Values) -> Promises {
         let apart = depth_bits::tells_apart(values);
+        // Whatever another fragment of the pixel has passed.
+        let independent = values.get(NOISE) == Noise::Primitive && values.get(POWER) == 1.0;
         Promises {
+            unbiased: Promise::always_if(apart && independent),
             order: if apart { OrderPromise::Independent } else { OrderPromise::Dependent },
             exact_opaque: OpaquePromise::Always,
             seeded: true,
-            // Surfaces of one object that lie within a cell share their threshold.
+            // Surfaces of one object that lie within a cell share their threshold, as do primitives
+            // whose masks lie at one place.
             ..Promises::NONE
         }
     }
@@ -69,6 +105,8 @@ impl Blueprint for HashedAlpha {
 /// The published threshold.
 #[derive(Clone, Copy, Debug)]
 pub struct HashedThreshold {
+    noise: Noise,
+    power: f64,
     each: Each,
     scale: f64,
     /// Pixels that one unit of depth is taken for: the depth range is as deep as the
@@ -76,9 +114,38 @@ pub struct HashedThreshold {
     depth_in_pixels: f64,
 }
 
+/// Places that a mask moves to, a step of PlayCanvas' texture apart, and by how much of the
+/// texture it moves from a primitive to the next.
+const PLACES: f64 = 32.0;
+const MOVED: f64 = 0.013;
+
 impl HashedThreshold {
-    /// The threshold in (0, 1] of a fragment, from `sample` on where each has its own.
+    /// What alpha is compared with, 0 to 1, for `sample` of a fragment.
     fn threshold(&self, seed: u32, site: Site, fragment: &Fragment, sample: u32) -> f64 {
+        let uniform = match self.noise {
+            Noise::Place => self.at_place(seed, site, fragment, sample),
+            Noise::Primitive => {
+                let pixel = [u32::from(site.x), u32::from(site.y)];
+                fraction(hash([seed, pixel[0], pixel[1], sample, fragment.primitive]))
+            }
+            Noise::Mask => {
+                // A frame's jitter in the shader; here each sample is a frame of its own.
+                let jitter = hash([seed, sample]);
+                let turn = f64::from(fragment.primitive) * MOVED;
+                let place = ((turn - turn.floor()) * PLACES) as usize * (TILE / PLACES as usize);
+                let at = |coordinate: u16, jitter: u32| {
+                    (usize::from(coordinate) + place + jitter as usize % TILE) % TILE
+                };
+                let (x, y) = (at(site.x, jitter), at(site.y, jitter >> 16));
+                let ranks = Dither::BlueNoise.ranks().expect("it has a mask");
+                (f64::from(ranks[y * TILE + x]) + 0.5) / (TILE * TILE) as f64
+            }
+        };
+        if self.power == 1.0 { uniform } else { libm::pow(uniform, self.power) }
+    }
+
+    /// The published threshold in (0, 1] of a fragment, from `sample` on where each has its own.
+    fn at_place(&self, seed: u32, site: Site, fragment: &Fragment, sample: u32) -> f64 {
         let depth = |unorm: f64| unorm * self.depth_in_pixels;
         let place = [
             f64::from(site.x) + 0.5,
@@ -99,11 +166,16 @@ impl HashedThreshold {
             let scale = libm::exp2(exponent);
             let [x, y, z] = place.map(|p| (p * scale).floor() as i64 as u32);
             let word = hash([seed, fragment.object, x, y, z, sample, exponent as i32 as u32]);
-            (f64::from(word) + 0.5) / 2_f64.powi(32)
+            fraction(word)
         };
         let (lower, upper) = (cell(log.floor()), cell(log.ceil()));
         uniform((1.0 - between) * lower + between * upper, between.min(1.0 - between))
     }
+}
+
+/// A word as a number between 0 and 1.
+fn fraction(word: u32) -> f64 {
+    (f64::from(word) + 0.5) / 2_f64.powi(32)
 }
 
 /// Makes a weighted mean of two uniform numbers uniform: its distribution function,
@@ -142,8 +214,12 @@ impl<const N: usize> Sampler<N> for HashedThreshold {
     ) -> SampleMask {
         let opacity = Threshold::of(fragment.alpha);
         let passes = |sample: u32, probe: &mut P| {
-            // Two hashes, one for each scale.
-            probe.hashed(2);
+            // Of a place two, one for each scale; a mask is looked up.
+            probe.hashed(match self.noise {
+                Noise::Place => 2,
+                Noise::Primitive => 1,
+                Noise::Mask => 0,
+            });
             let threshold = self.threshold(round.seed, site, fragment, sample);
             let x = (threshold * 2_f64.powi(32)) as u32;
             probe.reference(sample as u8, sample, x, opacity);
@@ -159,7 +235,7 @@ impl<const N: usize> Sampler<N> for HashedThreshold {
 
 #[cfg(test)]
 mod tests {
-    use super::uniform;
+    use super::*;
     use screendoor_trace::random::Stream;
 
     #[test]
@@ -177,5 +253,49 @@ mod tests {
             // Binomial: σ = 95; the bound is six of them.
             assert!(tenths.iter().all(|n: &i32| (n - 10_000).abs() < 570), "{tenths:?}");
         }
+    }
+
+    fn threshold(noise: Noise, power: f64) -> HashedThreshold {
+        let (each, scale, depth_in_pixels) = (Each::Sample, 1.0, 1.0);
+        HashedThreshold { noise, power, each, scale, depth_in_pixels }
+    }
+
+    #[test]
+    fn alphas_pass_as_often_as_the_power_says() {
+        let site = |i: u16| Site { x: i % 64, y: i / 64 };
+        for (noise, power) in [
+            (Noise::Primitive, 1.0),
+            (Noise::Mask, 1.0),
+            (Noise::Mask, 2.2),
+            (Noise::Primitive, 2.2),
+        ] {
+            let of = threshold(noise, power);
+            let fragment = Fragment { primitive: 7, ..Fragment::default() };
+            for alpha in [0.1, 0.3, 0.5] {
+                let passed = (0..4096).filter(|i| of.threshold(3, site(*i), &fragment, 0) < alpha);
+                let share = passed.count() as f64 / 4096.0;
+                // A mask holds each rank once; of white noise σ is 0.008 at most, and the bound six of them.
+                let bound = if noise == Noise::Mask { 3e-4 } else { 0.048 };
+                assert!(
+                    (share - alpha.powf(1.0 / power)).abs() < bound,
+                    "{noise:?} {alpha} {share}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn masks_have_32_places_and_most_neighbours_share_theirs() {
+        let of = threshold(Noise::Mask, 1.0);
+        let row = |primitive: u32| -> Vec<u64> {
+            let fragment = Fragment { primitive, ..Fragment::default() };
+            let at = |x| of.threshold(1, Site { x, y: 0 }, &fragment, 0).to_bits();
+            (0..64).map(at).collect()
+        };
+        let rows: Vec<Vec<u64>> = (0..1000).map(row).collect();
+        let places: std::collections::HashSet<&Vec<u64>> = rows.iter().collect();
+        assert_eq!(places.len(), 32);
+        let shared = rows.windows(2).filter(|pair| pair[0] == pair[1]).count();
+        assert!((570..600).contains(&shared), "{shared}");
     }
 }

@@ -107,7 +107,10 @@ fn objects_without_fragments_are_listed_with_the_reason() {
     let figures: Value = serde_json::from_slice(&fs::read(place.path("t.json")).unwrap()).unwrap();
     let unseen = figures["unseen"].as_array().unwrap();
     assert_eq!(unseen.len(), 3);
-    assert_eq!((unseen[1]["object"].as_u64(), unseen[1]["primitives"].as_u64()), (Some(2), Some(2)));
+    assert_eq!(
+        (unseen[1]["object"].as_u64(), unseen[1]["primitives"].as_u64()),
+        (Some(2), Some(2))
+    );
     assert_eq!(unseen[1]["reason"], format!("its 2 triangles are {clear}"));
 }
 

@@ -67,15 +67,16 @@ pub(super) fn in_short(b: &Beyond) -> Vec<Text> {
 }
 
 /// Names of the study's scenes.
-fn scenes(results: &Results) -> impl Iterator<Item = &str> {
+pub(super) fn scenes(results: &Results) -> impl Iterator<Item = &str> {
     results.study.scenes.iter().map(|scene| scene.name.as_str())
 }
 
 /// Every design's error as a share of the baseline's at the same count.
-fn ratios(results: &Results, samples: u32) -> Section {
+pub(super) fn ratios(results: &Results, samples: u32) -> Section {
     let study = &results.study;
+    let noun = if samples == 1 { "sample" } else { "samples" };
     let mut part =
-        Section::new(format!("RMSE as a share of `{}`'s, {samples} samples", study.baseline));
+        Section::new(format!("RMSE as a share of `{}`'s, {samples} {noun}", study.baseline));
     let to = RunName { series: &study.baseline, samples };
     let own = |scene| results.record(scene, to.series, samples).map(|r| two(r.covered.rmse.value));
     let first = ["`".to_string() + to.series + "`, RMSE", String::new()];
@@ -93,7 +94,7 @@ fn ratios(results: &Results, samples: u32) -> Section {
 }
 
 /// A share in as many digits as say something.
-fn share(value: f64) -> String {
+pub(super) fn share(value: f64) -> String {
     match value {
         0.0 => "0".to_string(),
         v if v < 0.1 => format!("{v:.4}"),
@@ -101,12 +102,12 @@ fn share(value: f64) -> String {
     }
 }
 
-fn two(value: f64) -> String {
+pub(super) fn two(value: f64) -> String {
     format!("{value:.2}")
 }
 
 /// Every mean error of the designs with its interval, and who is within what chance allows.
-fn means(results: &Results) -> Section {
+pub(super) fn means(results: &Results) -> Section {
     let mut part = Section::new(format!("Mean error, {SHOWN} samples"));
     let found = Found::of(&results.records);
     part.paragraph(format!(

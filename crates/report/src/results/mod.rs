@@ -15,6 +15,7 @@ mod noise;
 mod pixel_orders;
 mod ratios;
 mod slab;
+mod splats;
 mod summary;
 mod table_1;
 
@@ -116,6 +117,10 @@ pub fn chapter(measured: &Reproduced) -> Chapter {
             in_short = beyond::in_short(b);
             vec![beyond::section(b)]
         }
+        Reproduced::Splats(b) => {
+            in_short = splats::in_short(b);
+            vec![splats::section(b)]
+        }
         Reproduced::Stability(s) => stability::sections(s),
     };
     Chapter { sections, in_short, figures }
@@ -148,8 +153,13 @@ const METHODS: [Of<Methods>; 8] = [
 ];
 
 /// The parts of RESULTS.md, each of which can be measured on its own.
-pub const PARTS: [Publication; 4] =
-    [Publication::LaineKarras, Publication::Methods, Publication::Comparison, Publication::Beyond];
+pub const PARTS: [Publication; 5] = [
+    Publication::LaineKarras,
+    Publication::Methods,
+    Publication::Comparison,
+    Publication::Beyond,
+    Publication::Splats,
+];
 
 /// Where its figures lie, as seen from RESULTS.md.
 pub const FIGURES_FOLDER: &str = "figures";

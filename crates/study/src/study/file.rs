@@ -35,6 +35,7 @@ screendoor_trace::options! {
         Slab = "slab": "Wyman's claim: SLAB with 8 layers against 32 samples",
         Comparison = "comparison": "all designs at equal state, and Wyman's claim",
         Beyond = "beyond": "no publication's: residual and merging beside LK, error and bias over many seeds",
+        Splats = "splats": "no publication's: samplers and layers on files of Gaussian splats",
         Stability = "stability": "no publication's: hard cases with known truth, and correlations",
     }
 }

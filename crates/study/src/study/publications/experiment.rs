@@ -58,6 +58,7 @@ pub(in crate::study) mod studies {
     pub(crate) const EXPECTATIONS: &str = study!("expectations");
     pub(crate) const EXPECTATIONS_CLOSELY: &str = study!("expectations-closely");
     pub(crate) const FIGURE_8: &str = study!("figure-8", "figure-8");
+    pub(crate) const SPLATS: &str = study!("splats", "splats");
 }
 
 /// Reads an embedded study.

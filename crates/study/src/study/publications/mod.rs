@@ -10,6 +10,7 @@ pub mod methods;
 mod noise;
 mod reproduced;
 mod sampling;
+pub mod splats;
 mod table_1;
 
 use serde::Serialize;

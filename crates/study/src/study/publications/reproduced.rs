@@ -5,6 +5,7 @@ use crate::study::file::Publication;
 use crate::study::publications::beyond::{Beyond, beyond};
 use crate::study::publications::experiment::Lab;
 use crate::study::publications::methods::{Methods, methods};
+use crate::study::publications::splats::splats;
 use crate::study::publications::{Effort, Publications, reproduce};
 use crate::study::stress::{Stability, stress_designs};
 use screendoor_trace::error::Result;
@@ -22,6 +23,8 @@ pub enum Reproduced {
     Comparison(Box<Comparison>),
     /// [`Publication::Beyond`].
     Beyond(Box<Beyond>),
+    /// [`Publication::Splats`].
+    Splats(Box<Beyond>),
     /// [`Publication::Stability`].
     Stability(Box<Stability>),
 }
@@ -35,6 +38,7 @@ impl Reproduced {
             Reproduced::Slab(_) => Publication::Slab,
             Reproduced::Comparison(_) => Publication::Comparison,
             Reproduced::Beyond(_) => Publication::Beyond,
+            Reproduced::Splats(_) => Publication::Splats,
             Reproduced::Stability(_) => Publication::Stability,
         }
     }
@@ -45,7 +49,7 @@ impl Reproduced {
             Reproduced::LaineKarras(p) => &p.missing,
             Reproduced::Methods(_) | Reproduced::Stability(_) => &[],
             Reproduced::Slab(c) | Reproduced::Comparison(c) => &c.missing,
-            Reproduced::Beyond(b) => &b.missing,
+            Reproduced::Beyond(b) | Reproduced::Splats(b) => &b.missing,
         }
     }
 }
@@ -65,6 +69,7 @@ pub fn measure_publication(
         Publication::Slab => Reproduced::Slab(Box::new(compare_slab(lab, effort)?)),
         Publication::Comparison => Reproduced::Comparison(Box::new(compare(lab, effort)?)),
         Publication::Beyond => Reproduced::Beyond(Box::new(beyond(lab, effort)?)),
+        Publication::Splats => Reproduced::Splats(Box::new(splats(lab, effort)?)),
         Publication::Stability => {
             Reproduced::Stability(Box::new(stress_designs(16, |what, done, total| {
                 (lab.watch)(what, done, total);
