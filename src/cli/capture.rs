@@ -44,7 +44,8 @@ pub(super) struct Arguments {
     /// Where the samples lie
     #[arg(long, default_value = "auto", value_parser = option::<PatternKind>())]
     pattern: PatternKind,
-    /// Opacity in place of the materials' own; texture alphas still multiply it
+    /// Opacity in place of the materials' own; texture alphas still multiply it, and splats keep
+    /// theirs, multiplied by it
     #[arg(long, value_name = "A", allow_negative_numbers = true)]
     alpha: Option<f32>,
     /// A picture (PNG, JPEG, WebP, BMP, TGA) for surfaces that have no texture
@@ -218,6 +219,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
             distance: arguments.distance,
             field_of_view: arguments.fov,
             pose,
+            ..CameraOptions::default()
         },
         splats,
         space: arguments.space,

@@ -86,6 +86,7 @@ fn print(trace: &Trace, stats: &Statistics, console: &Console) -> Result<()> {
     line("samples", format!("{} ({}{nested})", header.pattern.samples(), header.pattern.name))?;
     let [r, g, b] = header.background;
     line("background", format!("{r} {g} {b}"))?;
+    line("colours", format!("{}, as designs blend them", header.space.name()))?;
     line("fragments", format!("{} of {} bytes", grouped(stats.fragments), header.row_bytes()))?;
     for (column, value) in &header.constants {
         line("  constant", format!("{} = {value}", column.name()))?;

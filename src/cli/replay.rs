@@ -12,8 +12,8 @@ use crate::cli::files::{JsonArgument, check, report, write_pictures};
 use crate::design::{Configured, REFERENCE, configure};
 use crate::error::Result;
 use crate::metrics::{Ensemble, EnsembleErrors, PixelClasses, Region};
-use crate::param::Values;
-use crate::picture::{Picture, PictureFile};
+use crate::param::{Options, Values};
+use crate::picture::{Picture, PictureFile, Space};
 use crate::rop::{EventCounts, Layout, Promises, ReplayOptions, Replayed, StateBits};
 use crate::study::engine::{EngineName, OnGpu};
 use crate::study::measure::replays;
@@ -172,7 +172,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
             .print(format_args!("{} at {samples} samples, seed {seed}: {place}", design.label()))?;
         print_speed(&document, trace.rows(), console)?;
         if let Some(errors) = &document.errors {
-            print_errors(errors, console)?;
+            print_errors(errors, trace.header().space, console)?;
         }
         print_events(&first, &design, console)
     });
@@ -232,7 +232,7 @@ fn print_gpu(gpu: &OnGpu, console: &Console) -> Result<()> {
     ))
 }
 
-fn print_errors(errors: &ErrorsByRegion, console: &Console) -> Result<()> {
+fn print_errors(errors: &ErrorsByRegion, space: Space, console: &Console) -> Result<()> {
     let seeds = errors.frame.seeds;
     let of = if seeds > 1 { format!(" of {seeds} seeds, 95 % intervals") } else { String::new() };
     console.print(format_args!("error against exact in 8-bit units{of}"))?;
@@ -243,9 +243,11 @@ fn print_errors(errors: &ErrorsByRegion, console: &Console) -> Result<()> {
         }
         let spread = |v: f64| if seeds > 1 { format!(" ± {v:.3}") } else { String::new() };
         console.print(format_args!(
-            "  {name:<8} RMSE {:.3}{} linear, {:.3}{} sRGB; mean error {:+.4}{}; max {:.1}",
+            "  {name:<8} RMSE {:.3}{} {}, {:.3}{} sRGB; mean error {:+.4}{}; max {:.1}",
             e.rmse.value,
             spread(e.rmse.half_width()),
+            // As it is blended; what an 8-bit picture cannot show counts in the first alone.
+            space.name(),
             e.rmse_srgb.value,
             spread(e.rmse_srgb.half_width()),
             e.mean.value,

@@ -555,7 +555,7 @@ fn scenes() -> Vec<Hostile> {
                 packed.write_all(&vec![0; 1 << 20]).unwrap();
                 packed.finish().unwrap()
             },
-            says: "after its last array",
+            says: "claims 2048 splats in",
             what: "2048 splats, and a MiB that packs into a KiB",
         },
         Hostile {

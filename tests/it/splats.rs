@@ -220,6 +220,40 @@ fn order_by_distance_and_by_depth_differ_beside_the_axis() {
 }
 
 #[test]
+fn what_lies_far_off_or_shows_nothing_cuts_nothing_away() {
+    let near = (Vec3::new(0.0, 0.0, 4.0), Vec3::splat(0.3), 0.9);
+    let drawn = |others: &[(Vec3, Vec3, f32)]| {
+        let all = [&[near], others].concat();
+        let found = fragments(&scene(&all), &options("inria", pose()));
+        found.iter().filter(|f| f.primitive == 0).count()
+    };
+    let alone = drawn(&[]);
+    assert!(alone > 20);
+    for other in [
+        (Vec3::new(0.0, 0.0, 1e6), Vec3::splat(0.1), 0.9),
+        (Vec3::new(0.0, 0.0, 1e6), Vec3::splat(1e5), 0.9),
+        (Vec3::new(0.0, 0.0, -1e6), Vec3::splat(1e6), 0.9),
+        (Vec3::new(1.0, 0.0, 0.3), Vec3::splat(1e5), 1e-9),
+    ] {
+        assert_eq!(drawn(&[other]), alone, "{other:?}");
+    }
+}
+
+#[test]
+fn distances_from_the_eye_are_told_apart_up_to_the_frame_s_corner() {
+    // Aside by 45 degrees the eye is further away than the far plane of depths would be.
+    let wide = Pose { focal: [14.0; 2], ..pose() };
+    let splats = [
+        (Vec3::new(9.0, 0.0, 9.0), Vec3::splat(0.5), 0.9),
+        (Vec3::new(10.0, 0.0, 10.0), Vec3::splat(0.5), 0.9),
+        (Vec3::new(0.0, 0.0, 5.0), Vec3::splat(0.5), 0.9),
+    ];
+    let found = fragments(&scene(&splats), &options("khr", wide));
+    let z = |primitive| found.iter().find(|f| f.primitive == primitive).unwrap().depth.z;
+    assert!(z(2) < z(0) && z(0) < z(1) && z(1).0 < u32::MAX, "{:?} {:?} {:?}", z(0), z(1), z(2));
+}
+
+#[test]
 fn what_leaves_no_fragment_is_told_of_splats_too() {
     let behind = scene(&[(Vec3::new(0.0, 0.0, 4.0), Vec3::splat(0.1), 0.001)]);
     let capture = options("inria", pose());
@@ -227,6 +261,10 @@ fn what_leaves_no_fragment_is_told_of_splats_too() {
     capture.to_memory(|_, _| ()).unwrap();
     let unseen = capture.unseen();
     assert!(unseen[0].reason.contains("its one splat is wholly transparent"), "{unseen:?}");
+    // Nothing that could be seen at all is an error.
+    let near = scene(&[(Vec3::new(0.0, 0.0, 0.1), Vec3::splat(0.1), 0.9)]);
+    let error = Capture::new(&near, &options("inria", pose())).map(|_| ()).unwrap_err();
+    assert!(error.to_string().contains("nearer than splats are drawn"), "{error}");
 }
 
 /// The folder of splats and other renderers' pictures of them.

@@ -21,7 +21,7 @@ fn cameras() -> Vec<CameraOptions> {
         angle: Some(angle),
         field_of_view: Some(fov),
         distance,
-        pose: None,
+        ..CameraOptions::default()
     })
     .collect()
 }

@@ -359,13 +359,20 @@ fn meshes_are_read_with_their_colours() {
 #[test]
 fn what_a_ply_file_does_not_hold_is_one_error() {
     let says = |bytes: &[u8], part: &str| {
-        let error = load("a.ply", bytes).unwrap_err().to_string();
+        let error = load("a.ply", bytes).expect_err(part).to_string();
         assert!(error.contains(part) && error.contains("a.ply"), "{error}");
         assert!(!error.contains('\n'), "{error}");
     };
     let edited = |from: &str, to: &str| file(&header(1).replace(from, to), &[SPLAT]);
     let mesh = |from: &str, to: &str| MESH.replacen(from, to, 1).into_bytes();
     says(&mesh("element face 1", "element face 0"), "5 numbers more");
+    let warned_of = |from: &str, to: &str, what: &str| {
+        warned(&load("a.ply", &mesh(from, to)).unwrap(), 1, &[what]);
+    };
+    warned_of("uchar red", "int red", "for 0 to 255");
+    warned_of("uchar red", "float red", "for 0 to 255");
+    let two = MESH.replacen("face 1", "face 2", 1) + "2 0 1\n";
+    warned(&load("a.ply", two.as_bytes()).unwrap(), 1, &["1 faces of fewer than three"]);
     says(&mesh("4 0 1 2 3\n", "4 0 1 2 7\n"), "4 vertices and names vertex 7");
     says(&mesh("4 0 1 2 3\n", "4 0 1 2 -1\n"), "names vertex -1");
     says(&mesh("4 0 1 2 3\n", "-4 0 1 2 3\n"), "a list of -4 values");

@@ -24,6 +24,10 @@ pub struct CameraOptions {
     pub field_of_view: Option<f64>,
     /// Where it stands, in place of all that.
     pub pose: Option<Pose>,
+    /// Splats are drawn whose means lie further away than this, in the scene's units.
+    pub splats_from: f64,
+    /// Whether depth varies over a splat, so that all of it is told apart, not its mean alone.
+    pub splats_deep: bool,
 }
 
 /// Degrees from top to bottom where nothing else is asked for.
@@ -32,8 +36,7 @@ const FIELD_OF_VIEW: f64 = 35.0;
 const MARGIN: f64 = 0.03;
 /// The near plane is at least this share of the far plane's distance.
 const NEAREST: f64 = 1e-3;
-/// The same of splats and of poses: some of what is there lies far outside or around the
-/// camera, and none of it is cut by the near plane.
+/// The same of poses, which stand among things.
 const NEAREST_AMONG: f64 = 1e-5;
 /// Parallel lines of sight begin nowhere. View space begins this many radii before the
 /// scene's centre where they are recorded, so that distances are those of a perspective
@@ -74,7 +77,7 @@ impl Camera {
     /// [`Error::Config`] for options out of range.
     pub fn frame(scene: &Scene, options: &CameraOptions, width: u32, height: u32) -> Result<Self> {
         if let Some(pose) = &options.pose {
-            return pose.camera(scene, width, height);
+            return pose.camera(scene, width, height, options);
         }
         let view = scene.view;
         let [yaw, pitch] = options.angle.unwrap_or([view.yaw, view.pitch]);
@@ -131,7 +134,8 @@ impl Camera {
         let aspect = f64::from(width) / f64::from(height);
         let room = 1.0 - 2.0 * MARGIN;
         let (mut nearest, mut furthest) = (f64::NEG_INFINITY, f64::INFINITY);
-        for (point, around) in scene.bounding_points() {
+        let flat = fov == 0.0;
+        for (point, around) in scene.solid_points().chain(scene.splat_points().filter(|_| flat)) {
             let z = in_view(point).z;
             nearest = nearest.max(z + around);
             furthest = furthest.min(z - around);
@@ -189,15 +193,9 @@ impl Camera {
                     distance.max(framed + slack)
                 }
             };
-            let far = distance - furthest;
-            if far <= 0.0 {
-                return Err(Error::config(
-                    "the whole scene lies behind the camera",
-                    "move it away with --distance",
-                ));
-            }
-            let least = if scene.has_splats() { NEAREST_AMONG } else { NEAREST };
-            let near = (distance - nearest).max(far * least);
+            let solid = (distance - nearest, distance - furthest);
+            let eye = centre + back * distance;
+            let [near, far] = range(scene, solid, NEAREST, (eye, -back, options))?;
             let projection = DMat4::from_cols(
                 DVec4::new(1.0 / tangent_x, 0.0, 0.0, 0.0),
                 DVec4::new(0.0, 1.0 / tangent_y, 0.0, 0.0),
@@ -213,7 +211,7 @@ impl Camera {
                 view_to_clip: projection.to_cols_array(),
             };
             let focal = [tangent_x, tangent_y].map(|tangent| 0.5 / tangent);
-            (projection * retreat * to_view, Some(centre + back * distance), seen, focal)
+            (projection * retreat * to_view, Some(eye), seen, focal)
         };
         let size = [f64::from(width), f64::from(height)];
         let range = match eye {
@@ -283,6 +281,42 @@ impl Camera {
     }
 }
 
+/// How far the near and the far plane stand from an eye that looks along `forward`. What is no
+/// splat has `solid` for its nearest and furthest distance, and is cut where it is nearer than
+/// the share `least` of the far one. Splats are drawn or not as a whole: none that is drawn has
+/// its mean before the near plane, nor beyond the far one by its distance from the eye.
+fn range(
+    scene: &Scene,
+    solid: (f64, f64),
+    least: f64,
+    (eye, forward, options): (DVec3, DVec3, &CameraOptions),
+) -> Result<[f64; 2]> {
+    let from = options.splats_from;
+    let (mut near, mut far) = (f64::INFINITY, f64::NEG_INFINITY);
+    if solid.1 > 0.0 {
+        (near, far) = (solid.0.max(solid.1 * least), solid.1);
+    }
+    for (mean, around) in scene.splat_points() {
+        let around = if options.splats_deep { around } else { 0.0 };
+        let distance = forward.dot(mean - eye);
+        if distance > from {
+            near = near.min((distance - around).max(from) * 0.999);
+            far = far.max(((mean - eye).length() + around) * 1.001);
+        }
+    }
+    let known = far.is_finite() && near > 0.0 && near < far;
+    if !known {
+        let hint = match scene.has_splats() {
+            true => "move it away with --distance, or set near of --splat-rules lower",
+            false => "move it away with --distance",
+        };
+        let nearer = if scene.has_splats() { " or nearer than splats are drawn" } else { "" };
+        let what = format_args!("the whole scene lies behind the camera{nearer}");
+        return Err(Error::config(what, hint));
+    }
+    Ok([near, far])
+}
+
 /// The projection along parallel lines of the `half` width and height, with depth 0 at the
 /// distance `near` and 1 at `far`.
 fn parallel([half_width, half_height]: [f64; 2], near: f64, far: f64) -> DMat4 {
@@ -345,7 +379,7 @@ mod tests {
                     angle: Some(angle),
                     field_of_view: Some(fov),
                     distance,
-                    pose: None,
+                    ..CameraOptions::default()
                 };
                 let scene = cube();
                 let camera = Camera::frame(&scene, &options, 320, 100).unwrap();

@@ -127,7 +127,13 @@ impl<'a> Capture<'a> {
             return Err(Error::config("an alpha lies in [0, 1]", "give --alpha such a number"));
         }
         let space = space(scene, options)?;
-        let camera = Camera::frame(scene, &options.camera, options.width, options.height)?;
+        let rules = &options.splats;
+        let seen = CameraOptions {
+            splats_from: rules.near(),
+            splats_deep: rules.is_deep(),
+            ..options.camera.clone()
+        };
+        let camera = Camera::frame(scene, &seen, options.width, options.height)?;
         let background = options.background.unwrap_or(scene.view.background);
         let mut header = Header {
             width: options.width,

@@ -107,7 +107,7 @@ impl Capture<'_> {
                 object: object as u32,
                 name: placed.name.clone(),
                 primitives: range.len() as u64,
-                reason: said(noun, counts, &transparent),
+                reason: said(noun, counts, &transparent, self.options.splats.near()),
             }
         };
         self.recorded.missing().map(unseen).collect()
@@ -174,18 +174,24 @@ fn reason_of_splat(splat: &Splat<'_>, tools: &Tools<'_>) -> Reason {
         Err(Nothing::NoArea) => Reason::NoArea,
         Ok(on_frame) => {
             let (first, last) = on_frame.rows();
-            if first > last { Reason::Outside } else { Reason::Thin }
+            let [x, y] = [on_frame.centre.x, on_frame.centre.y];
+            let [width, height] = tools.size.map(f64::from);
+            let inside = (0.0..=width).contains(&x) && (0.0..=height).contains(&y);
+            if first > last && !inside { Reason::Outside } else { Reason::Thin }
         }
     }
 }
 
 /// How many primitives are missing for which reason.
-fn said(noun: &str, counts: [u64; REASONS.len()], transparent: &str) -> String {
+fn said(noun: &str, counts: [u64; REASONS.len()], transparent: &str, near: f64) -> String {
     let all: u64 = counts.iter().sum();
     let mut parts: Vec<(u64, String)> = Vec::new();
     for ((reason, text), count) in REASONS.into_iter().zip(counts) {
         let text = match reason {
             Reason::Transparent => format!("{text} ({transparent})"),
+            Reason::Behind if noun == "splat" => {
+                format!("{text} or nearer than the rules' near={near}")
+            }
             _ => text.to_string(),
         };
         parts.push((count, text));
@@ -234,7 +240,7 @@ mod tests {
             angle: Some([0.0, 0.0]),
             distance: Some(0.25),
             field_of_view: Some(30.0),
-            pose: None,
+            ..CameraOptions::default()
         };
         let options = CaptureOptions {
             width: 32,
@@ -262,17 +268,17 @@ mod tests {
     #[test]
     fn reasons_are_counted_and_listed_as_they_are_numbered() {
         assert!(REASONS.iter().enumerate().all(|(i, (reason, _))| *reason as usize == i));
-        assert_eq!(said("triangle", [0; 6], ""), "it has no triangles");
+        assert_eq!(said("triangle", [0; 6], "", 0.0), "it has no triangles");
         assert_eq!(
-            said("triangle", [0, 1, 0, 0, 0, 0], ""),
+            said("triangle", [0, 1, 0, 0, 0, 0], "", 0.0),
             "its one triangle is outside the frame"
         );
         assert_eq!(
-            said("triangle", [2, 0, 0, 0, 0, 0], "why"),
+            said("triangle", [2, 0, 0, 0, 0, 0], "why", 0.0),
             "its 2 triangles are wholly transparent (why)"
         );
         assert_eq!(
-            said("triangle", [1, 0, 3, 0, 0, 0], "why"),
+            said("triangle", [1, 0, 3, 0, 0, 0], "why", 0.0),
             "of its 4 triangles 3 behind the camera, 1 wholly transparent (why)"
         );
     }

@@ -291,6 +291,22 @@ impl Scene {
         self.placed_points(Shape::bounding_points)
     }
 
+    /// Those of what is no splat.
+    pub(crate) fn solid_points(&self) -> impl Iterator<Item = (DVec3, f64)> + '_ {
+        self.placed_points(|shape| match shape {
+            Shape::Splats(_) => Box::new(std::iter::empty()),
+            other => other.bounding_points(),
+        })
+    }
+
+    /// Those of splats: the means of what shows something, and how far it reaches around.
+    pub(crate) fn splat_points(&self) -> impl Iterator<Item = (DVec3, f64)> + '_ {
+        self.placed_points(|shape| match shape {
+            Shape::Splats(_) => shape.bounding_points(),
+            _ => Box::new(std::iter::empty()),
+        })
+    }
+
     /// Those of them that a camera has in its frame.
     pub fn framed_points(&self) -> impl Iterator<Item = (DVec3, f64)> + '_ {
         self.placed_points(Shape::framed_points)
@@ -431,6 +447,10 @@ impl Scene {
                 }
             };
             return Err(Error::invalid(source, what, hint));
+        }
+        if self.bounding_points().next().is_none() {
+            let what = "all of its splats are broken or have an opacity of 0";
+            return Err(Error::invalid(source, what, "give a scene with something to see"));
         }
         let flat = self.flat_triangles();
         if flat == self.primitive_count() {

@@ -41,8 +41,9 @@ pub(super) fn load(path: &Path) -> Result<Scene> {
             }
             corners
         }
-        (false, true) => text(&bytes, &content)?,
-        (false, false) => {
+        // Text has none of these; bytes that begin like it and are cut short do.
+        (false, true) if !content.contains(&0) => text(&bytes, &content)?,
+        (false, _) => {
             let what = match count {
                 Some(count) => format!("its {count} triangles take {} bytes", length(count)),
                 None => "it is shorter than a header".to_string(),
@@ -72,26 +73,43 @@ pub(super) fn load(path: &Path) -> Result<Scene> {
     Ok(scene)
 }
 
-/// The corners of triangles in text.
+/// The corners of triangles in text: of facets of three corners each, up to its last word.
 fn text(bytes: &Bytes<'_>, content: &[u8]) -> Result<Vec<DVec3>> {
     let text = String::from_utf8_lossy(content);
-    let mut words = text.split_ascii_whitespace();
+    // A solid's name is any text.
+    let lines = text.lines().filter(|line| !line.trim_start().starts_with("solid"));
+    let mut words = lines.flat_map(str::split_ascii_whitespace);
     let mut corners = Vec::new();
+    let (mut facet, mut last) = (None, "");
     while let Some(word) = words.next() {
-        if word != "vertex" {
-            continue;
+        last = word;
+        match word {
+            "facet" => facet = Some(corners.len()),
+            "endfacet" => {
+                let own = facet.take().map_or(0, |first| corners.len() - first);
+                if own != 3 {
+                    return Err(bytes.bad(format_args!("a facet of it has {own} corners")));
+                }
+            }
+            // The solid's name may follow.
+            "endsolid" => break,
+            "vertex" => {
+                let mut number = || {
+                    let word = words.next().unwrap_or("");
+                    word.parse::<f64>().map_err(|_| {
+                        let few: String = word.chars().take(20).collect();
+                        bytes.bad(format_args!(
+                            "at a vertex stands '{few}' where a number is needed"
+                        ))
+                    })
+                };
+                corners.push(DVec3::new(number()?, number()?, number()?));
+            }
+            _ => {}
         }
-        let mut number = || {
-            let word = words.next().unwrap_or("");
-            word.parse::<f64>().map_err(|_| {
-                let few: String = word.chars().take(20).collect();
-                bytes.bad(format_args!("at a vertex stands '{few}' where a number is needed"))
-            })
-        };
-        corners.push(DVec3::new(number()?, number()?, number()?));
     }
-    if !corners.len().is_multiple_of(3) {
-        return Err(bytes.bad(format_args!("its triangles have {} corners", corners.len())));
+    if last != "endsolid" {
+        return Err(bytes.bad("it does not end with 'endsolid'"));
     }
     Ok(corners)
 }

@@ -375,10 +375,14 @@ impl SceneEntry {
             let poses = Poses::read(&base.join(path), self.size)?;
             poses.choose(self.camera_name.as_deref()).cloned()
         });
+        let pose = pose.transpose()?;
         let splats = self.splat_rules.as_deref().map(SplatRules::parse);
+        // A camera has a frame of its own, where the study does not say another.
+        let own = pose.as_ref().map(|pose| pose.size).filter(|_| self.size == defaults::size());
+        let [width, height] = own.unwrap_or(self.size);
         Ok(CaptureOptions {
-            width: self.size[0],
-            height: self.size[1],
+            width,
+            height,
             samples: self.captured_samples,
             pattern: self.pattern,
             alpha: self.alpha,
@@ -390,7 +394,8 @@ impl SceneEntry {
                 angle: self.angle,
                 distance: self.distance,
                 field_of_view: self.fov,
-                pose: pose.transpose()?,
+                pose,
+                ..CameraOptions::default()
             },
             splats: splats.transpose()?.unwrap_or_default(),
             space: self.space,

@@ -5,9 +5,10 @@ use std::path::Path;
 
 use glam::DVec3;
 use serde::Deserialize;
+use serde_json::Value;
 
 use crate::capture::camera::Pose;
-use screendoor_trace::error::{Error, Result};
+use screendoor_trace::error::{Error, Result, one_line};
 
 /// The longest file that is read, in bytes.
 const MAX_BYTES: u64 = 1 << 28;
@@ -16,9 +17,9 @@ const MAX_BYTES: u64 = 1 << 28;
 /// its axes, to the right, downwards and forward.
 #[derive(Deserialize)]
 struct Trained {
-    img_name: Option<String>,
-    width: u32,
-    height: u32,
+    img_name: Option<Value>,
+    width: f64,
+    height: f64,
     position: [f64; 3],
     rotation: [[f64; 3]; 3],
     fx: f64,
@@ -30,12 +31,26 @@ struct Trained {
 struct Transforms {
     #[serde(flatten)]
     lens: Lens,
+    camera_model: Option<String>,
+    #[serde(default)]
+    is_fisheye: bool,
     frames: Vec<Frame>,
 }
 
+/// The models of cameras whose lenses are pinholes, but for their distortion.
+const PINHOLES: [&str; 7] = [
+    "PINHOLE",
+    "SIMPLE_PINHOLE",
+    "OPENCV",
+    "PERSPECTIVE",
+    "SIMPLE_RADIAL",
+    "RADIAL",
+    "FULL_OPENCV",
+];
+
 #[derive(Deserialize)]
 struct Frame {
-    file_path: Option<String>,
+    file_path: Option<Value>,
     /// The rows of a matrix from camera space, x to the right, y up and z backwards.
     transform_matrix: Vec<[f64; 4]>,
     #[serde(flatten)]
@@ -58,13 +73,6 @@ struct Lens {
     k4: Option<f64>,
     p1: Option<f64>,
     p2: Option<f64>,
-}
-
-#[derive(Deserialize)]
-#[serde(untagged)]
-enum File {
-    Trained(Vec<Trained>),
-    Transforms(Box<Transforms>),
 }
 
 /// The cameras of a file, in its order.
@@ -97,18 +105,29 @@ impl Poses {
         }
         let bytes = std::fs::read(path).map_err(fail)?;
         let hint = "give a cameras.json of a training, or a transforms.json";
-        let file: File = serde_json::from_slice(&bytes).map_err(|e| {
-            let what = match e.is_data() {
-                // The library says that no variant fits.
-                true => "it holds no cameras that are known".to_string(),
-                false => format!("it is no JSON: {e}"),
-            };
-            Error::invalid(&place, what, hint)
-        })?;
+        let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
+        let bad = |what: String| Error::invalid(&place, what, hint);
+        let file: Value =
+            serde_json::from_slice(bytes).map_err(|e| bad(format!("it is no JSON: {e}")))?;
         let mut warnings = Vec::new();
         let poses: Vec<Pose> = match file {
-            File::Trained(list) => list.into_iter().enumerate().map(trained).collect(),
-            File::Transforms(file) => {
+            Value::Array(list) => {
+                let one = |(i, camera): (usize, Value)| {
+                    let camera = serde_json::from_value(camera).map_err(|e| e.to_string());
+                    let pose = camera.and_then(|camera| trained(i, camera));
+                    pose.map_err(|what| bad(format!("camera {i} of it: {what}")))
+                };
+                list.into_iter().enumerate().map(one).collect::<Result<_>>()?
+            }
+            file => {
+                let file: Transforms = serde_json::from_value(file)
+                    .map_err(|e| bad(format!("it holds no cameras that are known: {e}")))?;
+                let model = file.camera_model.as_deref().unwrap_or(PINHOLES[0]);
+                if file.is_fisheye || !PINHOLES.contains(&model) {
+                    let model = if file.is_fisheye { "fisheye" } else { model };
+                    let what = format!("its cameras are of the model '{}'", one_line(model));
+                    return Err(Error::unsupported(place, what, "give it undistorted cameras"));
+                }
                 let all = file.frames.iter().enumerate();
                 let poses = all.map(|(i, one)| {
                     let lens = one.lens.or(file.lens);
@@ -116,9 +135,8 @@ impl Poses {
                         let what = "its lenses' distortion is left out: give undistorted cameras";
                         warnings.push(format!("{place}: {what}"));
                     }
-                    transformed(i, one, &lens, frame).map_err(|what| {
-                        Error::invalid(format_args!("{place}, frame {i}"), what, hint)
-                    })
+                    transformed(i, one, &lens, frame)
+                        .map_err(|what| bad(format!("frame {i} of it: {what}")))
                 });
                 poses.collect::<Result<_>>()?
             }
@@ -151,17 +169,33 @@ impl Poses {
     }
 }
 
-fn trained((i, camera): (usize, Trained)) -> Pose {
+/// A name of text or a number.
+fn named(name: Option<&Value>, i: usize) -> String {
+    match name {
+        Some(Value::String(name)) => name.clone(),
+        Some(Value::Number(number)) => number.to_string(),
+        _ => i.to_string(),
+    }
+}
+
+/// A side of a frame in pixels.
+fn side(v: f64) -> std::result::Result<u32, String> {
+    let whole = (1.0..=65536.0).contains(&v).then(|| v.round() as u32);
+    whole.ok_or_else(|| format!("its frame has a side of {v} pixels; 1 to 65536 can be"))
+}
+
+fn trained(i: usize, camera: Trained) -> std::result::Result<Pose, String> {
     let row = camera.rotation;
     let column = |k: usize| DVec3::new(row[0][k], row[1][k], row[2][k]);
-    Pose {
-        name: camera.img_name.unwrap_or_else(|| i.to_string()),
+    let size = [side(camera.width)?, side(camera.height)?];
+    Ok(Pose {
+        name: named(camera.img_name.as_ref(), i),
         eye: DVec3::from(camera.position),
         axes: [column(0), column(1), column(2)],
         focal: [camera.fx, camera.fy],
-        principal: [camera.width, camera.height].map(|side| f64::from(side) / 2.0),
-        size: [camera.width, camera.height],
-    }
+        principal: size.map(|side| f64::from(side) / 2.0),
+        size,
+    })
 }
 
 impl Lens {
@@ -206,15 +240,10 @@ fn transformed(
         _ => return Err("its matrix has neither three nor four rows".into()),
     };
     let column = |k: usize| DVec3::new(rows[0][k], rows[1][k], rows[2][k]);
-    let size = match (lens.w, lens.h) {
-        (Some(w), Some(h)) => {
-            let side = |v: f64| (1.0..=65536.0).contains(&v).then(|| v.round() as u32);
-            [w, h].map(side)
-        }
-        _ => size.map(Some),
-    };
-    let [Some(w), Some(h)] = size else {
-        return Err("its frame has no size of 1 to 65536 pixels".into());
+    let [w, h] = match (lens.w, lens.h) {
+        (Some(w), Some(h)) => [side(w)?, side(h)?],
+        (None, None) => size,
+        _ => return Err("it has one of 'w' and 'h'".into()),
     };
     let sides = [w, h].map(f64::from);
     let from_angle = |angle: Option<f64>, side: f64| angle.map(|a| side / 2.0 / libm::tan(a / 2.0));
@@ -224,7 +253,7 @@ fn transformed(
         return Err("it says neither 'fl_x' nor 'camera_angle_x'".into());
     };
     Ok(Pose {
-        name: frame.file_path.clone().unwrap_or_else(|| i.to_string()),
+        name: named(frame.file_path.as_ref(), i),
         eye: column(3),
         axes: [column(0), -column(1), -column(2)],
         focal: [fx, fy],
@@ -248,7 +277,7 @@ mod tests {
     fn both_kinds_say_the_same() {
         // A quarter turn about the vertical: the camera looks along x.
         let trained = read(
-            r#"[{"id": 0, "img_name": "a", "width": 40, "height": 20, "position": [1, 2, 3],
+            r#"[{"id": 0, "img_name": "a", "width": 40.0, "height": 20, "position": [1, 2, 3],
                 "rotation": [[0, 0, 1], [0, 1, 0], [-1, 0, 0]], "fx": 50.0, "fy": 60.0}]"#,
         );
         let transforms = read(
@@ -292,6 +321,13 @@ mod tests {
     #[test]
     fn what_holds_no_cameras_is_one_error() {
         for (text, part) in [
+            (r#"[{"width": 4.0, "height": 4, "fx": 1}]"#, "camera 0 of it: missing field"),
+            (r#"{"camera_model": "EQUIRECTANGULAR", "frames": []}"#, "'EQUIRECTANGULAR'"),
+            (r#"{"is_fisheye": true, "frames": []}"#, "fisheye"),
+            (
+                r#"{"w": 4, "fl_x": 4, "frames": [{"transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,0]]}]}"#,
+                "one of 'w' and 'h'",
+            ),
             ("{", "no JSON"),
             ("[]", "no camera"),
             ("{}", "no cameras that are known"),

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::{DMat3, DMat4, DVec3, DVec4};
 
-use crate::capture::camera::{Camera, NEAREST_AMONG};
+use crate::capture::camera::{Camera, CameraOptions, NEAREST_AMONG, range};
 use crate::scene::{FileCamera, Scene};
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::trace::{Projection, View};
@@ -69,7 +69,13 @@ impl Pose {
     /// # Errors
     /// [`Error::Config`] for a pose that is none, a frame of another shape, and where the
     /// scene lies behind it.
-    pub(super) fn camera(&self, scene: &Scene, width: u32, height: u32) -> Result<Camera> {
+    pub(super) fn camera(
+        &self,
+        scene: &Scene,
+        width: u32,
+        height: u32,
+        options: &CameraOptions,
+    ) -> Result<Camera> {
         let bad = |what: String, hint: &str| {
             Err(Error::config(format_args!("the camera '{}' {what}", self.name), hint))
         };
@@ -82,7 +88,10 @@ impl Pose {
             return bad("has no axes at right angles".into(), "correct its matrix");
         }
         if !lens || self.size.contains(&0) {
-            return bad("has no lens".into(), "give it focal lengths in pixels above 0");
+            return bad(
+                "has no lens or no frame".into(),
+                "give it focal lengths and sizes in pixels above 0",
+            );
         }
         let scale = [width, height].map(f64::from);
         let scale = [0, 1].map(|i| scale[i] / f64::from(self.size[i]));
@@ -101,17 +110,20 @@ impl Pose {
         let back = -forward;
         let eye = scene.world.transform_point3(self.eye);
         let (mut near, mut far) = (f64::INFINITY, f64::NEG_INFINITY);
-        for (point, around) in scene.bounding_points() {
+        for (point, around) in scene.solid_points() {
             let distance = forward.dot(point - eye);
             near = near.min(distance - around);
             far = far.max(distance + around);
         }
-        if far.is_nan() || far <= 0.0 {
-            return bad("has the whole scene behind it".into(), "choose another one");
-        }
         // Something flat still needs a depth range.
-        let far = far * 1.001;
-        let near = (near * 0.999).max(far * NEAREST_AMONG);
+        let solid = (near * 0.999, far * 1.001);
+        let [near, far] =
+            range(scene, solid, NEAREST_AMONG, (eye, forward, options)).map_err(|e| match e {
+                Error::Config { what, hint } => {
+                    Error::Config { what: format!("camera '{}': {what}", self.name), hint }
+                }
+                other => other,
+            })?;
         let focal = [0, 1].map(|i| self.focal[i] * scale[i]);
         let principal = [0, 1].map(|i| self.principal[i] * scale[i]);
         let size = [f64::from(width), f64::from(height)];
@@ -150,7 +162,6 @@ impl Pose {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::capture::CameraOptions;
     use crate::scene::{Mesh, Shape};
     use glam::Vec3;
 

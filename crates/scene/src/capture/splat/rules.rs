@@ -66,7 +66,7 @@ const DISTANCE: Typed<Distance> = Typed::choice("distance", "axis", "what depth 
 const DEPTH: Typed<Depth> = Typed::choice("depth", "flat", "depth over the splat's pixels");
 const ALPHAS: Typed<Alphas> = Typed::choice("alpha", "centre", "where alphas are taken");
 const NEAR: Typed<f64> =
-    Typed::real("near", "0.2", (0.0, 1e6), "nearer splats are not drawn, in the scene's units");
+    Typed::real("near", "0.2", (1e-6, 1e6), "nearer splats are not drawn, in the scene's units");
 const LEAN: Typed<f64> = Typed::real(
     "lean",
     "0.3",
@@ -130,7 +130,7 @@ pub const RULE_SETS: [RuleSet; 8] = [
             ("kernel", "shifted"),
             ("extent", ROOT_8),
             ("cap", "1"),
-            ("near", "0"),
+            ("near", "0.1"),
             ("largest", "1024"),
         ],
     },
@@ -142,7 +142,7 @@ pub const RULE_SETS: [RuleSet; 8] = [
     RuleSet {
         name: "nvpro",
         help: "NVIDIA's vk_gaussian_splatting",
-        settings: &[("extent", ROOT_8), ("cap", "1"), ("near", "0")],
+        settings: &[("extent", ROOT_8), ("cap", "1"), ("near", "0.1")],
     },
     RuleSet {
         name: "spark",
@@ -153,7 +153,7 @@ pub const RULE_SETS: [RuleSet; 8] = [
             ("cap", "1"),
             ("cut", "0.00196078431372549"),
             ("distance", "eye"),
-            ("near", "0"),
+            ("near", "0.1"),
         ],
     },
     RuleSet {
@@ -164,7 +164,7 @@ pub const RULE_SETS: [RuleSet; 8] = [
             ("cap", "1"),
             ("cut", "0"),
             ("distance", "eye"),
-            ("near", "0"),
+            ("near", "0.1"),
         ],
     },
 ];
@@ -227,6 +227,16 @@ impl SplatRules {
     /// The name and what was set beside it.
     pub fn spec(&self) -> &str {
         &self.spec
+    }
+
+    /// Splats are drawn whose means lie further away than this, in the scene's units.
+    pub(crate) fn near(&self) -> f64 {
+        self.near
+    }
+
+    /// Whether depth varies over a splat.
+    pub(crate) fn is_deep(&self) -> bool {
+        self.depth == Depth::Plane
     }
 
     /// The kernel's value at its extent.

@@ -100,7 +100,8 @@ impl Loader<'_> {
                 Err(matter) => return Ok(Err(matter)),
             },
         };
-        let (mut splats, broken) = cloud.finish();
+        let (mut splats, broken, told) = cloud.finish();
+        self.scene.warnings.extend(told);
         splats.space = space.unwrap_or(Space::Encoded);
         if broken > 0 {
             let what = "have no finite place, size, turn, opacity or colour and show nothing";
@@ -149,6 +150,12 @@ impl Loader<'_> {
                 harmonics.push(self.numbers(accessor, HARMONIC, part)?);
             }
         }
+        let prefix = format!("{NAME}:SH_DEGREE_");
+        let claimed = of.keys().filter(|name| name.starts_with(&prefix)).count();
+        if claimed > harmonics.len() {
+            let what = "coefficients of harmonics that make up no whole degree are not read";
+            self.scene.warnings.push(format!("{}, {part}: {what}", self.place));
+        }
         if harmonics.is_empty() && colours.is_none() || opacities.is_none() && colours.is_none() {
             let what = "splats without colours or opacities are not drawn";
             return Ok(Err(self.warnings.matter_of("splat", what)));
@@ -161,6 +168,10 @@ impl Loader<'_> {
         }
         // A scale below 0 is none: so they are logarithms, as a draft had it.
         let logarithms = scales.arrays(0.0).any(|s: [f32; 3]| s.iter().any(|v| *v < 0.0));
+        if logarithms {
+            let what = "some scales are below 0, so that all are taken for logarithms";
+            self.scene.warnings.push(format!("{}, {part}: {what}", self.place));
+        }
         let scale = |v: f32| if logarithms { libm::exp(f64::from(v)) } else { f64::from(v) };
         let harmonics: Vec<Vec<[f32; 3]>> =
             harmonics.iter().map(|list| list.arrays(0.0).collect()).collect();

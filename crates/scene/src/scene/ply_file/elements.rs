@@ -268,7 +268,11 @@ pub(in crate::scene) fn elements<'a>(
             Numbers::Text { place, words: text.split_ascii_whitespace() }
         }
         encoding => Numbers::Bytes {
-            bytes: Bytes::new(place, rows),
+            bytes: {
+                let mut bytes = Bytes::new(place, content);
+                bytes.seek(read as u64)?;
+                bytes
+            },
             big_endian: encoding == Encoding::BinaryBigEndian,
         },
     };

@@ -47,10 +47,12 @@ pub(super) fn scene(path: &Path, elements: &[Element<'_>]) -> Result<Option<Scen
         let uv = |i| Vec2::new(real(i, uvs[0]), 1.0 - real(i, uvs[1]));
         mesh.uvs = (0..vertices.count).map(uv).collect();
     }
-    mesh.colours = colours(vertices);
+    let mut warnings = Vec::new();
+    mesh.colours = colours(vertices, |what| warnings.push(format!("{place}: {what}")));
 
     let mut cutter = Cutter::default();
     let mut points = Vec::new();
+    let mut few = 0;
     for (face, list) in corners.rows().enumerate() {
         let mut polygon = Vec::with_capacity(list.len());
         for index in list {
@@ -62,6 +64,7 @@ pub(super) fn scene(path: &Path, elements: &[Element<'_>]) -> Result<Option<Scen
             }
             polygon.push(*index as usize);
         }
+        few += usize::from(list.len() < 3);
         points.clear();
         points.extend(polygon.iter().map(|i| at(*i)));
         let triangles = cutter.triangulate(&points).map_err(|_| {
@@ -93,8 +96,13 @@ pub(super) fn scene(path: &Path, elements: &[Element<'_>]) -> Result<Option<Scen
             alpha_mode: if see_through { AlphaMode::Blend } else { AlphaMode::Opaque },
             ..Material::default()
         }],
+        warnings,
         ..Scene::default()
     };
+    if few > 0 {
+        let what = format!("{place}: {few} faces of fewer than three corners are not drawn");
+        scene.warnings.push(what);
+    }
     if COLOURS.iter().any(|names| columns(faces, *names).is_some()) {
         let what = "its faces' own colours are not read; vertices' are";
         scene.warnings.push(format!("{place}: {what}"));
@@ -112,14 +120,26 @@ fn columns<const N: usize>(of: &Element<'_>, names: [&str; N]) -> Option<[Place;
 
 /// Linear colours and alphas; empty where there are none. Whole numbers are shares of the
 /// greatest that their type holds, encoded as in pictures.
-fn colours(vertices: &Element<'_>) -> Vec<Vec4> {
+fn colours(vertices: &Element<'_>, mut warn: impl FnMut(&str)) -> Vec<Vec4> {
     let rgb = COLOURS.into_iter().find_map(|names| columns(vertices, names));
     let alpha = vertices.column("alpha");
     if rgb.is_none() && alpha.is_none() {
         return Vec::new();
     }
+    // Wide integers and real numbers hold 0 to 255 too, as some programs write them.
+    let most =
+        |column: Place| (0..vertices.count).map(|i| vertices.value(i, column)).fold(0.0, f64::max);
+    let wide = |column: &Place| {
+        let (greatest, most) = (vertices.greatest(*column), most(*column));
+        greatest == 1.0 && most > 1.0 || greatest > 65535.0 && most <= 255.0
+    };
+    let bytes = rgb.into_iter().flatten().chain(alpha).any(|column| wide(&column));
+    if bytes {
+        warn("its vertices' colours are taken for 0 to 255");
+    }
     let share = |i: usize, column: Place| {
-        (vertices.value(i, column) / vertices.greatest(column)).clamp(0.0, 1.0)
+        let whole = if bytes { 255.0 } else { vertices.greatest(column) };
+        (vertices.value(i, column) / whole).clamp(0.0, 1.0)
     };
     let colour = |i: usize| {
         let rgb = rgb.map_or([1.0; 3], |rgb| rgb.map(|c| srgb::decode(share(i, c)) as f32));

@@ -50,9 +50,15 @@ pub(super) struct Cloud {
     splats: Splats,
     /// How many are no splats: not finite, or turned by nothing.
     broken: usize,
+    /// What of the file is not read.
+    told: Vec<String>,
 }
 
 impl Cloud {
+    fn tell(&mut self, what: &str) {
+        self.told.push(format!("{}: {what}", self.place));
+    }
+
     /// One with room for `count`, which the file is known to have.
     pub(super) fn new(place: &str, degree: u32, count: usize) -> Self {
         let mut splats = Splats { degree, ..Splats::default() };
@@ -61,7 +67,7 @@ impl Cloud {
         splats.rotations.reserve_exact(count);
         splats.opacities.reserve_exact(count);
         splats.harmonics.reserve_exact(count * splats.coefficients());
-        Cloud { place: place.to_string(), splats, broken: 0 }
+        Cloud { place: place.to_string(), splats, broken: 0, told: Vec::new() }
     }
 
     pub(super) fn antialiased(mut self) -> Self {
@@ -94,14 +100,14 @@ impl Cloud {
         }
     }
 
-    /// The splats, and how many of them are broken.
-    pub(super) fn finish(self) -> (Splats, usize) {
-        (self.splats, self.broken)
+    /// The splats, how many of them are broken, and what is not read.
+    pub(super) fn finish(self) -> (Splats, usize, Vec<String>) {
+        (self.splats, self.broken, self.told)
     }
 
     /// The scene of them, whose format has these axes by habit.
     pub(super) fn scene(self, path: &Path, axes: Axes) -> Result<Scene> {
-        let Cloud { place, splats, broken } = self;
+        let Cloud { place, splats, broken, told } = self;
         if splats.means.is_empty() {
             return Err(Error::invalid(place, "it has no splats", "give a file with some"));
         }
@@ -117,6 +123,7 @@ impl Cloud {
             // Which side is the front, no file says.
             view: View { yaw: -30.0, pitch: 10.0, ..View::default() },
             axes,
+            warnings: told,
             ..Scene::default()
         };
         if broken > 0 {

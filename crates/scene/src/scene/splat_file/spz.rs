@@ -57,8 +57,8 @@ impl Head {
             let what = format_args!("its positions have {fraction} of 24 bits after the point");
             return Err(bytes.bad(what));
         }
-        // No packing makes less of a splat than a bit, and files of few bytes claim much.
-        if splats > MAX_SPLATS || splats / 8 > length {
+        // No packing makes less of a splat than a byte, and files of few bytes claim much.
+        if splats > MAX_SPLATS || splats > length {
             let what = format_args!("it claims {splats} splats in {length} bytes");
             return Err(bytes.bad(what));
         }
@@ -185,6 +185,9 @@ fn splats(place: &str, head: &Head, arrays: [&[u8]; 6]) -> Cloud {
             opacity: f64::from(alpha[0]) / 255.0,
         };
         cloud.push(&splat, &harmonics);
+    }
+    if head.flags & EXTENDED != 0 {
+        cloud.tell("its extension records are not read");
     }
     if head.flags & ANTIALIASED != 0 { cloud.antialiased() } else { cloud }
 }

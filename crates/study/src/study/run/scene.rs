@@ -78,8 +78,12 @@ fn draw(entry: &SceneEntry, base: &Path, path: &Path) -> Result<Vec<String>> {
     let mut writer =
         TraceWriter::new(file, &place, capture.header().clone(), WriteOptions::default())?;
     capture.draw(&mut writer, |_, _| ())?;
-    writer.finish()?.0.commit()?;
+    let (file, written) = writer.finish()?;
+    file.commit()?;
     drop(capture);
+    if written.rows == 0 {
+        scene.warnings.push(format!("{}: its trace has no fragments", entry.name));
+    }
     Ok(scene.warnings)
 }
 
