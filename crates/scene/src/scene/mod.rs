@@ -7,6 +7,7 @@
 mod axes;
 pub mod builtin;
 mod bytes;
+mod check;
 mod far;
 mod file;
 mod folder;
@@ -18,6 +19,7 @@ mod obj_file;
 mod ply_file;
 mod polygon;
 mod sampling;
+mod shape;
 mod source;
 mod splat_file;
 mod splats;
@@ -31,18 +33,18 @@ pub use source::{ENDINGS, check, meant_builtin, path_of, seen_from};
 
 use std::path::{Path, PathBuf};
 
-use glam::{DAffine3, DVec3, Mat3, Vec2, Vec3, Vec4};
+use glam::{DAffine3, DVec3, Vec3};
 
 pub use axes::Axes;
 pub use material::{AlphaMode, Material, TextureUse};
 pub use sampling::{Filter, Sampling, Wrap};
+pub use shape::{Mesh, Particles, Shape, Strands};
 pub use splats::Splats;
 pub use texture::Texture;
 
 use crate::scene::folder::Folder;
 use crate::scene::source::{BUILTIN, ending, no_builtin, no_scene};
 use screendoor_trace::error::{Error, Result};
-use screendoor_trace::picture::Space;
 
 /// The most texels of all textures of a scene that were read from files: 11 bytes
 /// each when loaded.
@@ -95,150 +97,6 @@ pub struct Object {
     pub shape: usize,
     /// From the shape's space to the scene's.
     pub place: DAffine3,
-}
-
-/// Something to draw.
-#[derive(Clone, Debug)]
-pub enum Shape {
-    /// A triangle mesh.
-    Mesh(Mesh),
-    /// Thin ribbons that face the camera.
-    Strands(Strands),
-    /// Squares that face the camera, or the outlines of ellipsoids.
-    Particles(Particles),
-    /// Gaussians, each of which leaves a fragment a pixel.
-    Splats(Splats),
-}
-
-impl Shape {
-    /// How many triangles or splats it draws.
-    pub fn primitive_count(&self) -> usize {
-        match self {
-            Shape::Mesh(mesh) => mesh.triangles.len(),
-            Shape::Strands(strands) => strands.segment_count() * 2,
-            Shape::Particles(particles) => particles.centres.len() * 2,
-            Shape::Splats(splats) => splats.means.len(),
-        }
-    }
-
-    /// What its colours are meant to be blended as.
-    pub fn space(&self) -> Space {
-        match self {
-            Shape::Splats(splats) => splats.space,
-            _ => Space::Linear,
-        }
-    }
-
-    /// Which of [`Scene::materials`] it is made of.
-    pub fn material(&self) -> usize {
-        match self {
-            Shape::Mesh(mesh) => mesh.material,
-            Shape::Strands(strands) => strands.material,
-            Shape::Particles(particles) => particles.material,
-            // They have colours of their own.
-            Shape::Splats(_) => 0,
-        }
-    }
-
-    /// Points that bound it, each with a radius around it.
-    fn bounding_points(&self) -> Box<dyn Iterator<Item = (Vec3, f32)> + '_> {
-        match self {
-            Shape::Mesh(mesh) => Box::new(
-                mesh.triangles.iter().flatten().map(|i| (mesh.positions[*i as usize], 0.0)),
-            ),
-            Shape::Strands(s) => Box::new(s.points.iter().copied().zip(s.radii.iter().copied())),
-            Shape::Particles(p) if p.axes.is_empty() => Box::new(
-                // A square's corner is further from its centre than its side.
-                p.centres.iter().copied().zip(p.sizes.iter().map(|s| s * std::f32::consts::SQRT_2)),
-            ),
-            // The corners of the boxes around the ellipsoids.
-            Shape::Particles(p) => {
-                let corner =
-                    |i: u32| Vec3::from([0, 1, 2].map(|k| 1.0 - (i >> k & 1) as f32 * 2.0));
-                let corners = move |(centre, axes): (&Vec3, &Mat3)| {
-                    let (centre, axes) = (*centre, *axes);
-                    (0..8).map(move |i| (centre + axes * corner(i), 0.0))
-                };
-                Box::new(p.centres.iter().zip(&p.axes).flat_map(corners))
-            }
-            Shape::Splats(splats) => Box::new(splats.bounding_points()),
-        }
-    }
-
-    /// Those of its bounding points that a camera has in its frame: all but what lies far
-    /// outside, which trained splats have a few of.
-    fn framed_points(&self) -> Box<dyn Iterator<Item = (Vec3, f32)> + '_> {
-        match self {
-            Shape::Splats(splats) => Box::new(splats.framed_points()),
-            _ => self.bounding_points(),
-        }
-    }
-}
-
-/// A triangle mesh. The optional attributes are empty, or one for each position.
-#[derive(Clone, Debug, Default)]
-pub struct Mesh {
-    /// Vertex positions.
-    pub positions: Vec<Vec3>,
-    /// Vertex normals; a mesh without them is shaded flat.
-    pub normals: Vec<Vec3>,
-    /// Texture coordinates, (0, 0) at the texture's top left.
-    pub uvs: Vec<Vec2>,
-    /// A second set of texture coordinates.
-    pub more_uvs: Vec<Vec2>,
-    /// Linear colours and alphas, multiplied into the material's.
-    pub colours: Vec<Vec4>,
-    /// Vertex numbers, three a triangle, in API order.
-    pub triangles: Vec<[u32; 3]>,
-    /// Which of [`Scene::materials`].
-    pub material: usize,
-}
-
-/// Curves drawn as ribbons that face the camera.
-#[derive(Clone, Debug, Default)]
-pub struct Strands {
-    /// Points along all curves, curve after curve.
-    pub points: Vec<Vec3>,
-    /// Half of the ribbon's width at each point.
-    pub radii: Vec<f32>,
-    /// Linear colours and alphas, one for each curve or one for each point, multiplied into the
-    /// material's.
-    pub colours: Vec<Vec4>,
-    /// The first point of each curve, and at the end the number of points; each
-    /// curve has at least two.
-    pub starts: Vec<u32>,
-    /// Which of [`Scene::materials`].
-    pub material: usize,
-}
-
-impl Strands {
-    /// How many curves there are.
-    pub fn strand_count(&self) -> usize {
-        self.starts.len().saturating_sub(1)
-    }
-
-    /// How many straight pieces the curves have.
-    pub fn segment_count(&self) -> usize {
-        self.points.len() - self.strand_count()
-    }
-}
-
-/// Squares that face the camera, or the rectangles around the outlines of ellipsoids.
-#[derive(Clone, Debug, Default)]
-pub struct Particles {
-    /// Centres.
-    pub centres: Vec<Vec3>,
-    /// Half of the side; of an ellipsoid the longest semi-axis.
-    pub sizes: Vec<f32>,
-    /// Turn around the axis towards the camera, in radians; empty for none.
-    pub angles: Vec<f32>,
-    /// Empty, or each particle is an ellipsoid that has the columns for semi-axes,
-    /// and no angle.
-    pub axes: Vec<Mat3>,
-    /// Linear colours and alphas, multiplied into the material's.
-    pub colours: Vec<Vec4>,
-    /// Which of [`Scene::materials`].
-    pub material: usize,
 }
 
 /// From where a scene is best seen.
@@ -404,131 +262,6 @@ impl Scene {
             colours.iter_mut().for_each(|c| *c = Vec3::ONE.extend(c.w));
         }
     }
-
-    /// Checks that the scene can be drawn: indices in range, numbers finite,
-    /// something there at all.
-    fn check(&mut self) -> Result<()> {
-        let source = &self.source;
-        // First, since a small file can name a shape very often.
-        if u32::try_from(self.primitive_count()).is_err() {
-            let hint = "split the scene";
-            return Err(Error::unsupported(
-                source,
-                "it has more than 2^32 triangles and splats",
-                hint,
-            ));
-        }
-        let mut checked = vec![false; self.shapes.len()];
-        for object in &self.objects {
-            let place = format!("{source}, object '{}'", object.name);
-            if !object.place.is_finite() {
-                let hint = "correct its transformation";
-                return Err(Error::invalid(place, "it stands at no finite place", hint));
-            }
-            // A shape that several objects show is looked at once.
-            if std::mem::replace(&mut checked[object.shape], true) {
-                continue;
-            }
-            match &self.shapes[object.shape] {
-                Shape::Mesh(mesh) => check_mesh(mesh, &place)?,
-                Shape::Strands(s) => check_points(&s.points, &place)?,
-                Shape::Particles(p) => check_points(&p.centres, &place)?,
-                Shape::Splats(splats) => check_points(&splats.means, &place)?,
-            }
-        }
-        if self.primitive_count() == 0 {
-            let hint = "give a scene with at least one triangle";
-            // What was left out may be all there is.
-            let what = match &self.warnings[..] {
-                [] => "the scene has no triangles".to_string(),
-                all => {
-                    let few = all[..all.len().min(3)].join("; ");
-                    format!("the scene has no triangles ({few})")
-                }
-            };
-            return Err(Error::invalid(source, what, hint));
-        }
-        if self.bounding_points().next().is_none() {
-            let what = "all of its splats are broken or have an opacity of 0";
-            return Err(Error::invalid(source, what, "give a scene with something to see"));
-        }
-        let flat = self.flat_triangles();
-        if flat == self.primitive_count() {
-            let what = format_args!("all of its {flat} triangles have no area").to_string();
-            return Err(Error::invalid(source, what, "give a scene with something to see"));
-        }
-        if flat > 0 {
-            let warning = format!("{source}: {flat} triangles have no area and draw nothing");
-            self.warnings.push(warning);
-        }
-        Ok(())
-    }
-
-    /// How many triangles of meshes have no area.
-    fn flat_triangles(&self) -> usize {
-        let of_shape = |shape: &Shape| match shape {
-            Shape::Mesh(mesh) => mesh
-                .triangles
-                .iter()
-                .filter(|t| {
-                    let [a, b, c] = t.map(|i| mesh.positions[i as usize].as_dvec3());
-                    (b - a).cross(c - a) == DVec3::ZERO
-                })
-                .count(),
-            Shape::Strands(_) | Shape::Particles(_) | Shape::Splats(_) => 0,
-        };
-        let by_shape: Vec<usize> = self.shapes.iter().map(of_shape).collect();
-        self.objects.iter().map(|o| by_shape[o.shape]).sum()
-    }
-}
-
-fn check_points(points: &[Vec3], place: &str) -> Result<()> {
-    match points.iter().position(|p| !p.is_finite()) {
-        None => Ok(()),
-        Some(i) => Err(Error::invalid(
-            place,
-            format_args!("vertex {i} is {}, which is no finite place", points[i]),
-            "correct the vertex",
-        )),
-    }
-}
-
-fn check_mesh(mesh: &Mesh, place: &str) -> Result<()> {
-    check_points(&mesh.positions, place)?;
-    let count = mesh.positions.len();
-    let bad = mesh.triangles.iter().position(|t| t.iter().any(|i| *i as usize >= count));
-    if let Some(triangle) = bad {
-        return Err(Error::invalid(
-            place,
-            format_args!(
-                "triangle {triangle} names vertices {:?} of only {count}",
-                mesh.triangles[triangle]
-            ),
-            "correct the indices",
-        ));
-    }
-    for (name, length) in [
-        ("normals", mesh.normals.len()),
-        ("texture coordinates", mesh.uvs.len()),
-        ("second texture coordinates", mesh.more_uvs.len()),
-        ("colours", mesh.colours.len()),
-    ] {
-        if length != 0 && length != count {
-            return Err(Error::invalid(
-                place,
-                format_args!("it has {count} vertices and {length} {name}"),
-                "give one for each vertex, or none",
-            ));
-        }
-    }
-    let finite = mesh.uvs.iter().chain(&mesh.more_uvs).all(|v| v.is_finite())
-        && mesh.normals.iter().all(|v| v.is_finite())
-        && mesh.colours.iter().all(|v| v.is_finite());
-    if !finite {
-        let what = "a normal, texture coordinate or colour is not finite";
-        return Err(Error::invalid(place, what, "correct the vertex"));
-    }
-    Ok(())
 }
 
 /// How a scene is loaded.
