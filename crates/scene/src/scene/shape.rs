@@ -37,7 +37,7 @@ impl Shape {
         }
     }
 
-    /// Which of [`Scene::materials`] it is made of.
+    /// Which of [`materials`](crate::scene::Scene::materials) it is made of.
     pub fn material(&self) -> usize {
         match self {
             Shape::Mesh(mesh) => mesh.material,
@@ -98,7 +98,7 @@ pub struct Mesh {
     pub colours: Vec<Vec4>,
     /// Vertex numbers, three a triangle, in API order.
     pub triangles: Vec<[u32; 3]>,
-    /// Which of [`Scene::materials`].
+    /// Which of [`materials`](crate::scene::Scene::materials).
     pub material: usize,
 }
 
@@ -115,7 +115,7 @@ pub struct Strands {
     /// The first point of each curve, and at the end the number of points; each
     /// curve has at least two.
     pub starts: Vec<u32>,
-    /// Which of [`Scene::materials`].
+    /// Which of [`materials`](crate::scene::Scene::materials).
     pub material: usize,
 }
 
@@ -145,6 +145,6 @@ pub struct Particles {
     pub axes: Vec<Mat3>,
     /// Linear colours and alphas, multiplied into the material's.
     pub colours: Vec<Vec4>,
-    /// Which of [`Scene::materials`].
+    /// Which of [`materials`](crate::scene::Scene::materials).
     pub material: usize,
 }
