@@ -8,6 +8,7 @@ use crate::cli::arguments::{RunArguments, numbers};
 use crate::cli::console::{Console, shown};
 use crate::cli::files::{JsonArgument, check, report};
 use crate::error::{Error, Result};
+use crate::picture::Space;
 use crate::rop::{Contents, ExplainLimits, Site, Step};
 use crate::study::explained::Explained;
 use crate::trace::{SampleMask, Unorm32};
@@ -76,7 +77,9 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
             before = step.contents.clone();
         }
         let [r, g, b] = explanation.colour;
-        console.print(format_args!("resolved: {r:.5} {g:.5} {b:.5}"))
+        let space = trace.header().space;
+        let space = if space == Space::Linear { "" } else { " (encoded)" };
+        console.print(format_args!("resolved: {r:.5} {g:.5} {b:.5}{space}"))
     })
 }
 

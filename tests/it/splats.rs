@@ -220,6 +220,19 @@ fn order_by_distance_and_by_depth_differ_beside_the_axis() {
 }
 
 #[test]
+fn opacity_is_never_raised_by_what_a_splat_is_limited_to() {
+    // Far larger than the frame: PlayCanvas' rules limit its size, not what is known of it.
+    let scene = scene(&[(Vec3::new(0.0, 0.0, 4.0), Vec3::splat(40.0), 0.5)]);
+    for rules in ["playcanvas:factor=always", "playcanvas", "inria:factor=always"] {
+        let options = options(rules, pose());
+        let [(_, splat)] = &Capture::new(&scene, &options).unwrap().splats_on_frame()[..] else {
+            panic!("{rules}")
+        };
+        assert!(splat.opacity <= 0.5 && splat.opacity > 0.49, "{rules}: {}", splat.opacity);
+    }
+}
+
+#[test]
 fn what_lies_far_off_or_shows_nothing_cuts_nothing_away() {
     let near = (Vec3::new(0.0, 0.0, 4.0), Vec3::splat(0.3), 0.9);
     let drawn = |others: &[(Vec3, Vec3, f32)]| {

@@ -138,8 +138,13 @@ fn stl_is_the_same_as_text_and_as_bytes() {
     says(b"", "shorter than a header");
     says(&stl(0)[..183], "2 triangles take 184 bytes, and it has 183");
     says(&stl(0)[20..], "its");
-    says(b"solid a\nvertex 1 2\nvertex 3 4 5", "'vertex' where a number");
+    says(b"solid a\nfacet\nvertex 1 2\nvertex 3 4 5\nendsolid", "'vertex' where a number");
     says(&STL.as_bytes()[..STL.len() - 11], "does not end with 'endsolid'");
+    says(b"solid a\nvertex 1 2 3\nendsolid a", "in no facet");
+    says(STL.replacen("endfacet\n", "", 2).as_bytes(), "does not end");
+    // Several solids are one scene.
+    let two = load("a.stl", STL.repeat(2).as_bytes()).unwrap();
+    assert_eq!(mesh(&two, 0).triangles.len(), 4);
     says(STL.replacen("vertex 0 0 0\n", "", 1).as_bytes(), "a facet of it has 2 corners");
     says(b"solid a\nendsolid a", "no triangles");
 }

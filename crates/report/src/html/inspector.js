@@ -261,7 +261,9 @@ function inspector(element) {
       ...(scene.seed ? ['--seed', String(scene.seed)] : [])].map(shellWord).join(' ');
     const code = make('code', {}, command);
     const tells = told(picture, x, y);
-    const body = tells ? story(await explanation(picture)) : [
+    const run = tells ? await explanation(picture) : {};
+    toldSpace = run.space ?? 'linear';
+    const body = tells ? story(run) : [
       make('p', {}, 'This tells the pixel’s story, fragment by fragment:')];
     if (turn !== latest) return;
     element.dataset.pixel = `${x},${y}`;

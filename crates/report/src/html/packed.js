@@ -71,9 +71,13 @@ function encode(linear) {
   return linear <= 0.0031308 ? linear * 12.92 : 1.055 * Math.pow(linear, 1 / 2.4) - 0.055;
 }
 
-/** A linear colour for style sheets. */
+/** What the numbers of the colours that are told stand for. */
+let toldSpace = 'linear';
+
+/** A told colour for style sheets. */
 function cssColour(colour) {
-  return `rgb(${colour.map((v) => Math.round(encode(v) * 255)).join(' ')})`;
+  const shown = (v) => (toldSpace === 'encoded' ? Math.min(Math.max(v, 0), 1) : encode(v));
+  return `rgb(${colour.map((v) => Math.round(shown(v) * 255)).join(' ')})`;
 }
 
 /** A single-precision value with as many digits as make it unambiguous. */

@@ -133,8 +133,8 @@ pub(super) fn section(c: &Comparison) -> Section {
         let rows = sizes.into_iter().map(|bytes| {
             let [a, b] = [within(&before, bytes), within(&after, bytes)];
             let says = |p: Option<&Point<'_>>| p.map_or("—".to_string(), Point::says);
-            let gain =
-                a.zip(b).map_or("—".to_string(), |(a, b)| format!("{:.2}", b.error / a.error));
+            let gain = a.zip(b).filter(|(a, _)| a.error > 0.0);
+            let gain = gain.map_or("—".to_string(), |(a, b)| format!("{:.2}", b.error / a.error));
             [format!("{bytes:.0}"), says(a), says(b), gain]
         });
         let mut table = Section::new(format!("Designs: {which}"));

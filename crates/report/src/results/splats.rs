@@ -61,16 +61,22 @@ pub(super) fn in_short(b: &Beyond) -> Vec<Text> {
         let record = results.record(scene, POWERED, SHOWN)?;
         Some(format!("{:.1} (`{scene}`)", parts(record)[1].sqrt()))
     });
+    let biases: Vec<String> = biases.collect();
+    let bias = match biases.is_empty() {
+        true => String::new(),
+        false => format!(
+            " PlayCanvas' power of 2.2 leaves a bias of {} of 255, which no number of frames takes away.",
+            biases.join(", ")
+        ),
+    };
     let text = format!(
         "**Gaussian splats** ({} scenes, {} × {} pixels, {} seeds): RMSE at {SHOWN} samples as a share of \
-         that of the white noise that most renderers ship, geometric mean and range: {}. PlayCanvas' power \
-         of 2.2 leaves a bias of {} of 255, which no number of frames takes away.",
+         that of the white noise that most renderers ship, geometric mean and range: {}.{bias}",
         results.scenes.len(),
         b.side,
         b.side,
         results.study.seeds,
-        gains.join("; "),
-        biases.collect::<Vec<_>>().join(", ")
+        gains.join("; ")
     );
     vec![text.into()]
 }

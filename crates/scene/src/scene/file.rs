@@ -44,7 +44,7 @@ pub(super) fn regular(file: File) -> io::Result<(File, u64)> {
 ///
 /// # Errors
 /// As [`open`], and where it is longer than 4 GiB.
-pub(super) fn read(path: &Path) -> Result<Vec<u8>> {
+pub(crate) fn read(path: &Path) -> Result<Vec<u8>> {
     whole(open(path)?, path)
 }
 

@@ -9,7 +9,7 @@ pub mod builtin;
 mod bytes;
 mod check;
 mod far;
-mod file;
+pub(crate) mod file;
 mod folder;
 mod gltf_file;
 mod hair_file;

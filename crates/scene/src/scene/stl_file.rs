@@ -73,16 +73,22 @@ pub(super) fn load(path: &Path) -> Result<Scene> {
     Ok(scene)
 }
 
-/// The corners of triangles in text: of facets of three corners each, up to its last word.
+/// The corners of triangles in text: of facets of three corners each, of all solids.
 fn text(bytes: &Bytes<'_>, content: &[u8]) -> Result<Vec<DVec3>> {
     let text = String::from_utf8_lossy(content);
-    // A solid's name is any text.
-    let lines = text.lines().filter(|line| !line.trim_start().starts_with("solid"));
-    let mut words = lines.flat_map(str::split_ascii_whitespace);
+    // A solid's name is any text, before its facets and behind them.
+    let named = |line: &&str| {
+        let line = line.trim_start();
+        !line.starts_with("solid") && !line.starts_with("endsolid")
+    };
+    let ended = text.lines().rfind(|line| !line.trim().is_empty());
+    if !ended.is_some_and(|line| line.trim_start().starts_with("endsolid")) {
+        return Err(bytes.bad("it does not end with 'endsolid'"));
+    }
+    let mut words = text.lines().filter(named).flat_map(str::split_ascii_whitespace);
     let mut corners = Vec::new();
-    let (mut facet, mut last) = (None, "");
+    let mut facet = None;
     while let Some(word) = words.next() {
-        last = word;
         match word {
             "facet" => facet = Some(corners.len()),
             "endfacet" => {
@@ -91,8 +97,9 @@ fn text(bytes: &Bytes<'_>, content: &[u8]) -> Result<Vec<DVec3>> {
                     return Err(bytes.bad(format_args!("a facet of it has {own} corners")));
                 }
             }
-            // The solid's name may follow.
-            "endsolid" => break,
+            "vertex" if facet.is_none() => {
+                return Err(bytes.bad("a vertex of it stands in no facet"));
+            }
             "vertex" => {
                 let mut number = || {
                     let word = words.next().unwrap_or("");
@@ -108,8 +115,8 @@ fn text(bytes: &Bytes<'_>, content: &[u8]) -> Result<Vec<DVec3>> {
             _ => {}
         }
     }
-    if last != "endsolid" {
-        return Err(bytes.bad("it does not end with 'endsolid'"));
+    if facet.is_some() {
+        return Err(bytes.bad("a facet of it does not end"));
     }
     Ok(corners)
 }

@@ -6,6 +6,7 @@ use screendoor_designs::Configured;
 use screendoor_rop::{ExplainLimits, Explanation, Site};
 use screendoor_trace::error::Result;
 use screendoor_trace::param::Values;
+use screendoor_trace::picture::Space;
 use screendoor_trace::trace::Trace;
 
 /// What a design does at one pixel, with all that names the run: what
@@ -24,9 +25,16 @@ pub struct Explained<'a> {
     pub samples: u32,
     /// The seed.
     pub seed: u32,
+    /// What the numbers of colours stand for, where it is not light.
+    #[serde(skip_serializing_if = "is_linear")]
+    pub space: Space,
     /// Fragment by fragment. Passes that do not look at a fragment are left out.
     #[serde(flatten)]
     pub explanation: Explanation,
+}
+
+fn is_linear(space: &Space) -> bool {
+    *space == Space::Linear
 }
 
 impl<'a> Explained<'a> {
@@ -52,6 +60,7 @@ impl<'a> Explained<'a> {
             pixel: [site.x, site.y],
             samples,
             seed,
+            space: trace.header().space,
             explanation,
         })
     }

@@ -362,6 +362,16 @@ impl SceneEntry {
         scene::load_with(&scene::seen_from(source, base), &options)
     }
 
+    /// What of its camera's file is not honoured.
+    ///
+    /// # Errors
+    /// As [`Poses::read`].
+    pub fn camera_warnings(&self, base: &Path) -> Result<Vec<String>> {
+        let file = self.camera.as_ref().filter(|path| Poses::is_file(Path::new(path)));
+        let poses = file.map(|path| Poses::read(&base.join(path), self.size)).transpose()?;
+        Ok(poses.map_or(Vec::new(), |poses| poses.warnings))
+    }
+
     /// How it is captured, where its file has these cameras; paths are seen from the folder
     /// `base`.
     ///
@@ -437,9 +447,10 @@ impl SceneEntry {
                 "give one of the two",
             ));
         }
-        if self.camera_name.is_some() && self.camera.is_none() {
+        let of_file = self.camera.as_ref().is_some_and(|path| Poses::is_file(Path::new(path)));
+        if self.camera_name.is_some() && !of_file {
             return Err(Error::config(
-                format_args!("scene '{name}' has a camera_name and no camera"),
+                format_args!("scene '{name}' has a camera_name and no file of cameras"),
                 "give the file of cameras as 'camera'",
             ));
         }

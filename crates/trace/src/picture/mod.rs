@@ -135,12 +135,14 @@ impl Picture {
         result
     }
 
-    /// This picture minus `other`: differences of their numbers as they are.
+    /// This picture minus `other`, in amounts of light.
     ///
     /// # Panics
     /// As [`Picture::zip`].
     pub fn minus(&self, other: &Picture) -> Picture {
-        self.zip(other, |a, b| std::array::from_fn(|i| a[i] - b[i])).in_space(Space::Linear)
+        let light = |c: f64| self.space.to_linear(c);
+        let minus = |a: [f64; 3], b: [f64; 3]| std::array::from_fn(|i| light(a[i]) - light(b[i]));
+        self.zip(other, minus).in_space(Space::Linear)
     }
 
     /// How many of its pixels have a channel that is NaN or infinite.

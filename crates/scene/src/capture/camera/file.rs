@@ -8,6 +8,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use crate::capture::camera::Pose;
+use crate::scene::file;
 use screendoor_trace::error::{Error, Result, one_line};
 
 /// The longest file that is read, in bytes.
@@ -96,21 +97,19 @@ impl Poses {
     /// # Errors
     /// [`Error::Io`] where it cannot be read, [`Error::Invalid`] where it holds no cameras.
     pub fn read(path: &Path, frame: [u32; 2]) -> Result<Self> {
-        let fail = |e| Error::io("read", path, e);
         let place = path.display().to_string();
-        let length = std::fs::metadata(path).map_err(fail)?.len();
-        if length > MAX_BYTES {
+        let bytes = file::read(path)?;
+        if bytes.len() as u64 > MAX_BYTES {
             let hint = "give a file of fewer cameras";
             return Err(Error::unsupported(place, "it is longer than 256 MiB", hint));
         }
-        let bytes = std::fs::read(path).map_err(fail)?;
         let hint = "give a cameras.json of a training, or a transforms.json";
         let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
         let bad = |what: String| Error::invalid(&place, what, hint);
-        let file: Value =
+        let cameras: Value =
             serde_json::from_slice(bytes).map_err(|e| bad(format!("it is no JSON: {e}")))?;
         let mut warnings = Vec::new();
-        let poses: Vec<Pose> = match file {
+        let poses: Vec<Pose> = match cameras {
             Value::Array(list) => {
                 let one = |(i, camera): (usize, Value)| {
                     let camera = serde_json::from_value(camera).map_err(|e| e.to_string());
@@ -119,8 +118,8 @@ impl Poses {
                 };
                 list.into_iter().enumerate().map(one).collect::<Result<_>>()?
             }
-            file => {
-                let file: Transforms = serde_json::from_value(file)
+            other => {
+                let file: Transforms = serde_json::from_value(other)
                     .map_err(|e| bad(format!("it holds no cameras that are known: {e}")))?;
                 let model = file.camera_model.as_deref().unwrap_or(PINHOLES[0]);
                 if file.is_fisheye || !PINHOLES.contains(&model) {

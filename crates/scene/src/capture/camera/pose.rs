@@ -82,15 +82,19 @@ impl Pose {
         let axes = DMat3::from_cols(self.axes[0], self.axes[1], self.axes[2]);
         let gram = axes.transpose() * axes;
         let rigid = (gram - DMat3::IDENTITY).to_cols_array().iter().all(|v| v.abs() < RIGID);
-        let lens = self.focal.iter().all(|f| f.is_finite() && *f > 0.0)
-            && self.principal.iter().all(|p| p.is_finite());
+        // In sides of the frame. Beyond that nobody's lens is, and the grid of the frame ends.
+        let sides = self.size.map(f64::from);
+        let lens = [0, 1].iter().all(|i| {
+            (1e-3..=1e4).contains(&(self.focal[*i] / sides[*i]))
+                && (self.principal[*i] / sides[*i]).abs() <= 1e3
+        });
         if !(rigid && axes.determinant() > 0.0 && self.eye.is_finite()) {
             return bad("has no axes at right angles".into(), "correct its matrix");
         }
         if !lens || self.size.contains(&0) {
             return bad(
                 "has no lens or no frame".into(),
-                "give it focal lengths and sizes in pixels above 0",
+                "give it a size in pixels and focal lengths of a thousandth to 10000 of it",
             );
         }
         let scale = [width, height].map(f64::from);
@@ -231,6 +235,8 @@ mod tests {
         says(Pose { axes: [DVec3::X, DVec3::X, DVec3::Z], ..pose() }, "right angles");
         says(Pose { axes: [DVec3::X, -DVec3::Y, DVec3::Z], ..pose() }, "right angles");
         says(Pose { focal: [0.0, 1.0], ..pose() }, "lens");
+        says(Pose { focal: [1e20, 1e20], ..pose() }, "lens");
+        says(Pose { principal: [f64::NAN, 0.0], ..pose() }, "lens");
         says(Pose { size: [60, 80], ..pose() }, "shape");
         says(Pose { eye: DVec3::new(0.0, 0.0, 9.0), ..pose() }, "behind");
     }

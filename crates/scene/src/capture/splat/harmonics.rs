@@ -49,7 +49,7 @@ pub(super) fn basis(degree: u32, d: DVec3) -> [f64; 25] {
     b
 }
 
-/// The encoded colour of a splat with these coefficients, seen along the unit direction `d`.
+/// The colour of a splat with these coefficients, in its own space, in the direction of the basis.
 pub(super) fn colour(coefficients: &[[f32; 3]], basis: &[f64; 25]) -> [f64; 3] {
     let mut sum = [0.5; 3];
     for (c, b) in coefficients.iter().zip(basis) {

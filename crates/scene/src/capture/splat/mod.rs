@@ -13,7 +13,7 @@ use self::rules::{Alphas, Depth, Distance, Factor};
 pub use self::rules::{PARAMS, RULE_SETS, RuleSet, SplatRules};
 use crate::capture::camera::Camera;
 use crate::scene::Splats;
-use screendoor_trace::picture::{Space, srgb};
+use screendoor_trace::picture::Space;
 use screendoor_trace::trace::{DepthPlane, Fragment, SampleMask, Unorm32};
 
 /// Scales below this share of a splat's greatest have no normal of their own.
@@ -124,7 +124,6 @@ impl<'a> Painter<'a> {
         let undilated = x.cross(y).length_squared();
         let more = rules.dilation;
         let whole = undilated + more * (xx + yy) + more * more;
-        let (covariance, whole) = self.limited([xx + more, x.dot(y), yy + more], whole);
         if !(whole.is_finite() && whole > 0.0) {
             return Err(Nothing::NoArea);
         }
@@ -133,7 +132,8 @@ impl<'a> Painter<'a> {
             Factor::Auto => splats.antialiased,
             Factor::Never => false,
         };
-        let factor = if lowered { (undilated / whole).max(0.0).sqrt() } else { 1.0 };
+        let factor = if lowered { (undilated / whole).sqrt() } else { 1.0 };
+        let (covariance, whole) = self.limited([xx + more, x.dot(y), yy + more], whole);
         let opacity = f64::from(splats.opacities[i]) * factor * f64::from(self.alpha);
         let reach = rules.reach(opacity).ok_or(Nothing::Transparent)?;
         let [xx, xy, yy] = covariance;
@@ -202,7 +202,8 @@ impl<'a> Painter<'a> {
         // By its eigenvalues and the direction of the longer axis.
         let (sin, cos) = libm::sincos(libm::atan2(xy, half) / 2.0);
         let turn = DMat2::from_cols(DVec2::new(cos, sin), DVec2::new(-sin, cos));
-        let values = DVec2::new(most, (mid - spread).min(most));
+        // The lesser as what the greater leaves of the determinant: their difference would cancel.
+        let values = DVec2::new(most, (whole / (mid + spread)).min(most));
         let limited = turn * DMat2::from_diagonal(values) * turn.transpose();
         ([limited.x_axis.x, limited.x_axis.y, limited.y_axis.y], values.x * values.y)
     }
@@ -231,11 +232,14 @@ impl<'a> Painter<'a> {
         let coefficients = &splats.harmonics[i * count..(i + 1) * count];
         let own = harmonics::colour(coefficients, &harmonics::basis(splats.degree, along));
         own.map(|c| {
-            let c = match (splats.space, self.space) {
-                (own, space) if own == space => c,
+            let c = match splats.space {
+                own if own == self.space => c,
                 // A display shows no more than 1.
-                (Space::Encoded, _) => srgb::decode(c.min(1.0)),
-                (Space::Linear, _) => srgb::encode(c),
+                own => self.space.of_linear(own.to_linear(c.min(if own == Space::Encoded {
+                    1.0
+                } else {
+                    f64::INFINITY
+                }))),
             };
             // Beyond half precision there is no need to go.
             c.min(65504.0) as f32

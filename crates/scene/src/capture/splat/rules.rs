@@ -59,7 +59,7 @@ const DILATION: Typed<f64> = Typed::real(
 );
 const FACTOR: Typed<Factor> =
     Typed::choice("factor", "auto", "lower opacity by what dilation adds to the size");
-const CAP: Typed<f64> = Typed::real("cap", "0.99", (0.0, 1.0), "the greatest alpha");
+const CAP: Typed<f64> = Typed::real("cap", "0.99", (0.001, 1.0), "the greatest alpha");
 const CUT: Typed<f64> =
     Typed::real("cut", "0.00392156862745098", (0.0, 1.0), "alphas below are not drawn");
 const DISTANCE: Typed<Distance> = Typed::choice("distance", "axis", "what depth follows");
@@ -207,6 +207,11 @@ impl SplatRules {
             let what = format_args!("splat rules '{spec}': this kernel needs an extent");
             return Err(Error::config(what, "set extent to where splats end, such as 3"));
         }
+        if values.get(DEPTH) == Depth::Plane && values.get(DISTANCE) == Distance::Eye {
+            let what =
+                format_args!("splat rules '{spec}': planes are of depths along the view axis");
+            return Err(Error::config(what, "set distance=axis, or depth=flat"));
+        }
         Ok(SplatRules {
             spec: spec.to_string(),
             kernel: values.get(KERNEL),
@@ -303,6 +308,7 @@ mod tests {
         says("inria:kernel=shifted", "extent");
         says("inria:dilation=-1", "dilation");
         says("inria:cutt=1", "cut");
+        says("spark:depth=plane", "distance=axis");
     }
 
     #[test]

@@ -86,7 +86,8 @@ impl Cloud {
         let rotation = Quat::from_xyzw(x, y, z, w);
         let colour = harmonics.iter().flatten().all(|v| v.is_finite());
         let good = mean.is_finite()
-            && scale.is_finite()
+            // What reaches beyond all numbers is nowhere.
+            && (scale * 16.0).is_finite()
             && scale.min_element() >= 0.0
             && rotation.is_finite()
             && (0.0..=1.0).contains(opacity)

@@ -71,6 +71,7 @@ fn draw(entry: &SceneEntry, base: &Path, path: &Path) -> Result<Vec<String>> {
     if entry.white {
         scene.whiten();
     }
+    scene.warnings.extend(entry.camera_warnings(base)?);
     let options = entry.options(base, &scene.cameras)?;
     let capture = Capture::new(&scene, &options)?;
     let file = OutputFile::create(path)?;
