@@ -240,7 +240,7 @@ mod tests {
     fn the_time_follows_the_effort() {
         let usual =
             Effort { seeds: 4, seeds_of_means: 128, side: 800, comparison_side: 128, brief: false };
-        assert_eq!(about(minutes(usual, None, 2)), "68 minutes");
+        assert_eq!(about(minutes(usual, None, 2)), "74 minutes");
         let parts: f64 = PARTS.iter().map(|part| minutes(usual, Some(*part), 2)).sum();
         assert_eq!(parts, minutes(usual, None, 2));
         let small = Effort { side: 128, seeds_of_means: 2, comparison_side: 32, seeds: 2, ..usual };
