@@ -166,6 +166,10 @@ fn alpha_0_leaves_nothing_and_one_fragment_is_right_on_average() {
     let single = trace(&header, &layered(&header, 1, |_| (5, [1.0; 3], 0.3)));
     for design in all_variants() {
         assert_eq!(picture(&design, &invisible, 8, 0).get(7, 7), [0.0; 3], "{}", design.label());
+        // A power of the random number is another alpha: that is what it is there to show.
+        if design.label().contains("power=") {
+            continue;
+        }
         let limit = match (design.promises().seeded, design.info().family) {
             // 64 × 64 pixels: the mean's deviation is below 0.0072 even where a pixel's
             // samples are decided together; six of them.

@@ -92,6 +92,9 @@ impl Blueprint for HashedAlpha {
         let independent = values.get(NOISE) == Noise::Primitive && values.get(POWER) == 1.0;
         Promises {
             unbiased: Promise::always_if(apart && independent),
+            consistent: Promise::always_if(
+                apart && independent && values.get(THRESHOLD) == Each::Sample,
+            ),
             order: if apart { OrderPromise::Independent } else { OrderPromise::Dependent },
             exact_opaque: OpaquePromise::Always,
             seeded: true,
