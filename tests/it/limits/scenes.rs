@@ -101,7 +101,11 @@ pub(super) fn triangles_cost_little_and_too_many_are_refused() {
     fs::write(folder.path().join("t.gltf"), document.to_string()).unwrap();
     let run = capture(folder.path(), "t.gltf", "4x4");
     assert_eq!(run.status.code(), Some(1), "{}", run.error);
-    assert!(run.error.contains("more than 2^32 triangles and splats; split the scene"), "{}", run.error);
+    assert!(
+        run.error.contains("more than 2^32 triangles and splats; split the scene"),
+        "{}",
+        run.error
+    );
     assert!(run.mib <= 2 * BESIDE_SCENE, "{} MiB", run.mib);
     assert!(run.seconds < 30.0, "{} s", run.seconds);
 }
