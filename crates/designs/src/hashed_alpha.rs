@@ -88,7 +88,8 @@ impl Blueprint for HashedAlpha {
 
     fn promises(values: &Values) -> Promises {
         let apart = depth_bits::tells_apart(values);
-        // Whatever another fragment of the pixel has passed.
+        // Surfaces of one object that lie within a cell share their threshold, as do primitives
+        // whose masks lie at one place; a hash of the primitive is new for each.
         let independent = values.get(NOISE) == Noise::Primitive && values.get(POWER) == 1.0;
         Promises {
             unbiased: Promise::always_if(apart && independent),
@@ -98,9 +99,6 @@ impl Blueprint for HashedAlpha {
             order: if apart { OrderPromise::Independent } else { OrderPromise::Dependent },
             exact_opaque: OpaquePromise::Always,
             seeded: true,
-            // Surfaces of one object that lie within a cell share their threshold, as do primitives
-            // whose masks lie at one place.
-            ..Promises::NONE
         }
     }
 }
