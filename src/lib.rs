@@ -46,7 +46,7 @@ pub use screendoor_rop as rop;
 pub use screendoor_rop::resolve;
 pub use screendoor_scene::{capture, scene};
 pub use screendoor_study::{metrics, study};
-pub use screendoor_trace::{error, options, output, param, picture, random, tile, trace};
+pub use screendoor_trace::{edit, error, options, output, param, picture, random, tile, trace};
 
 /// The worked example of `docs/ADD_A_DESIGN.md`, compiled and run as a test.
 #[cfg(doctest)]

@@ -44,12 +44,17 @@ impl Console {
 
     /// Prints an error to standard error; the program will end with a failure.
     pub fn error(&self, error: &Error) {
-        self.failed.set(true);
+        self.fail();
         // Where standard error is closed there is nobody to tell.
         let _ = writeln!(io::stderr().lock(), "screendoor: error: {}", shown(error));
     }
 
-    /// Whether an error has been printed.
+    /// The program will end with a failure, of which all is said.
+    pub fn fail(&self) {
+        self.failed.set(true);
+    }
+
+    /// Whether an error has been printed, or there was another failure.
     pub fn has_failed(&self) -> bool {
         self.failed.get()
     }

@@ -6,6 +6,8 @@ mod compare;
 mod console;
 mod demo;
 mod designs;
+mod diff;
+mod edit;
 mod explain;
 mod files;
 mod info;
@@ -61,6 +63,11 @@ enum Command {
     Scenes(scenes::Arguments),
     Throughput(throughput::Arguments),
     Verify(verify::Arguments),
+    Diff(diff::Arguments),
+    Convert(edit::ConvertArguments),
+    Trim(edit::TrimArguments),
+    Join(edit::JoinArguments),
+    Shuffle(edit::ShuffleArguments),
     Reproduce(reproduce::Arguments),
     Stress(stress::Arguments),
 }
@@ -149,6 +156,11 @@ fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         Command::Scenes(a) => scenes::run(a, console),
         Command::Throughput(a) => throughput::run(a, console),
         Command::Verify(a) => verify::run(a, console),
+        Command::Diff(a) => diff::run(a, console),
+        Command::Convert(a) => edit::run_convert(a, console),
+        Command::Trim(a) => edit::run_trim(a, console),
+        Command::Join(a) => edit::run_join(a, console),
+        Command::Shuffle(a) => edit::run_shuffle(a, console),
         Command::Reproduce(a) => reproduce::run(a, console),
         Command::Stress(a) => stress::run(a, console),
     }

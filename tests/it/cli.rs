@@ -1,6 +1,7 @@
 //! The program as its users run it.
 
 mod compare;
+mod edits;
 mod gpu;
 mod outputs;
 mod study;

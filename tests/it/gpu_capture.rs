@@ -195,7 +195,7 @@ fn options_that_a_gpu_cannot_follow_are_refused() {
 }
 
 /// A device that is not ours, as in somebody else's program.
-fn foreign() -> Option<(wgpu::Device, wgpu::Queue)> {
+pub fn foreign() -> Option<(wgpu::Device, wgpu::Queue)> {
     gpu()?;
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
     let adapter = pollster::block_on(instance.request_adapter(&Default::default())).unwrap();
@@ -225,7 +225,7 @@ fn a_buffer_that_is_full_says_how_much_was_needed() {
            }";
     let draw = |capacity: u32| {
         let fragments = FragmentBuffer::new(&device, capacity).unwrap();
-        draw_8_by_8(&device, &queue, &source, &fragments);
+        draw_on((&device, &queue), &source, [8, 8], &[], &fragments);
         fragments.read(&device, &queue).unwrap()
     };
     let Captured::All(all) = draw(64) else { panic!("64 pixels are enough") };
@@ -241,12 +241,30 @@ fn a_buffer_that_is_full_says_how_much_was_needed() {
     assert_eq!((fragment.depth.z.0, fragment.depth.dzdx), (1 << 30, 0));
 }
 
-fn draw_8_by_8(
-    device: &wgpu::Device,
-    queue: &wgpu::Queue,
+/// Draws with a shader that records as group 1: triangles of these corners, each a place in
+/// clip space and a colour, or one without any.
+pub fn draw_on(
+    (device, queue): (&wgpu::Device, &wgpu::Queue),
     source: &str,
+    [width, height]: [u32; 2],
+    corners: &[[f32; 8]],
     fragments: &FragmentBuffer,
 ) {
+    let bytes: Vec<u8> = corners.as_flattened().iter().flat_map(|v| v.to_le_bytes()).collect();
+    let vertices = device.create_buffer(&wgpu::BufferDescriptor {
+        label: None,
+        size: bytes.len().max(4) as u64,
+        usage: wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    queue.write_buffer(&vertices, 0, &bytes);
+    let attributes = wgpu::vertex_attr_array![0 => Float32x4, 1 => Float32x4];
+    let layout_of_corners = wgpu::VertexBufferLayout {
+        array_stride: 32,
+        step_mode: wgpu::VertexStepMode::Vertex,
+        attributes: &attributes,
+    };
+    let buffers = if corners.is_empty() { vec![] } else { vec![Some(layout_of_corners)] };
     let format = wgpu::TextureFormat::Rgba8Unorm;
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: None,
@@ -263,7 +281,7 @@ fn draw_8_by_8(
             module: &module,
             entry_point: None,
             compilation_options: Default::default(),
-            buffers: &[],
+            buffers: &buffers,
         },
         primitive: Default::default(),
         depth_stencil: None,
@@ -279,7 +297,7 @@ fn draw_8_by_8(
     });
     let target = device.create_texture(&wgpu::TextureDescriptor {
         label: None,
-        size: wgpu::Extent3d { width: 8, height: 8, depth_or_array_layers: 1 },
+        size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
         mip_level_count: 1,
         sample_count: 4,
         dimension: wgpu::TextureDimension::D2,
@@ -301,7 +319,8 @@ fn draw_8_by_8(
         });
         pass.set_pipeline(&pipeline);
         pass.set_bind_group(1, fragments.bind_group(), &[]);
-        pass.draw(0..3, 0..1);
+        pass.set_vertex_buffer(0, vertices.slice(..));
+        pass.draw(0..corners.len().max(3) as u32, 0..1);
     }
     queue.submit([encoder.finish()]);
 }

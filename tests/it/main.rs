@@ -6,6 +6,7 @@ mod cli;
 mod colour;
 mod comparisons;
 mod conformance;
+mod edits;
 mod events;
 mod fast;
 mod foreign;

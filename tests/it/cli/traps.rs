@@ -152,6 +152,11 @@ fn every_command_writes_json_with_a_schema_and_typed_parameters() {
         (&["capture", "builtin:ramps", "-o", "x.arrow", "--size", "9x9"], false),
         (&["info", "t.arrow"], false),
         (&["verify", "t.arrow"], false),
+        (&["diff", "t.arrow", "t.arrow"], false),
+        (&["convert", "t.arrow", "-o", "e.arrow"], false),
+        (&["trim", "t.arrow", "-o", "e.arrow", "--samples", "2"], false),
+        (&["join", "t.arrow", "t.arrow", "-o", "e.arrow"], false),
+        (&["shuffle", "t.arrow", "-o", "e.arrow"], false),
         (&["replay", "t.arrow", "--design", "slab", "--samples", "4"], true),
         (&["compare", "a.exr", "a.exr"], false),
         (&["explain", "t.arrow", "--pixel", "24,36", "--samples", "4"], true),
@@ -181,9 +186,9 @@ fn every_command_writes_json_with_a_schema_and_typed_parameters() {
         }
         schemas.push(name);
     }
-    // Two commands of studies write one document.
+    // Some commands write one document: those of studies, and those that write traces anew.
     schemas.dedup();
-    assert_eq!(schemas.len(), 11);
+    assert_eq!(schemas.len(), 13);
     // The list is whole: a command has --json, or prints no figures.
     for name in crate::measured::commands() {
         let tried = commands.iter().any(|(arguments, _)| arguments[0] == name);

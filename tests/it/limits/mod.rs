@@ -5,7 +5,16 @@ mod scenes;
 mod studies;
 mod traces;
 
+use std::path::Path;
+
+use crate::edits;
 use crate::measured::{Run, commands};
+use crate::util::header;
+
+/// Writes a trace of so many fragments on a frame of 256 x 256 pixels.
+pub fn many_pixels(path: &Path, fragments: u32) {
+    traces::write(path, &header(256, 256, 4), fragments, traces::many);
+}
 
 /// A command, and tests of it.
 type Held = (&'static str, &'static [fn()]);
@@ -47,6 +56,11 @@ const HELD: &[Held] = &[
     ("scenes", &[lists_take_next_to_nothing]),
     ("throughput", &[traces::memory_is_what_was_allowed_and_a_constant]),
     ("verify", &[traces::memory_is_what_was_allowed_and_a_constant]),
+    ("diff", &[edits::memory_is_what_was_allowed_and_a_constant]),
+    ("convert", &[edits::memory_is_what_was_allowed_and_a_constant]),
+    ("trim", &[edits::memory_is_what_was_allowed_and_a_constant]),
+    ("join", &[edits::memory_is_what_was_allowed_and_a_constant]),
+    ("shuffle", &[edits::memory_is_what_was_allowed_and_a_constant]),
     ("reproduce", &[studies::the_smallest_reproduction]),
     ("stress", &[crate::stress::nothing_that_is_promised_is_broken_and_nothing_is_lost]),
 ];
@@ -72,7 +86,7 @@ fn every_command_is_held_to_its_limits_and_they_are_written_down() {
 #[test]
 fn lists_take_next_to_nothing() {
     for command in ["designs", "scenes"] {
-        let run = Run::of(std::path::Path::new("."), &[command]);
+        let run = Run::of(Path::new("."), &[command]);
         run.is_good(64, command);
         assert!(run.seconds < 10.0, "{command}: {} s", run.seconds);
     }

@@ -84,6 +84,34 @@ pub enum Scalar {
     Real(f32),
 }
 
+impl Scalar {
+    /// Whether the two are one value, bit for bit: 0 is not −0.
+    pub fn is(self, other: Scalar) -> bool {
+        match (self, other) {
+            (Scalar::Real(a), Scalar::Real(b)) => a.to_bits() == b.to_bits(),
+            _ => self == other,
+        }
+    }
+
+    /// Its bits; of one column, different values have different ones.
+    pub fn bits(self) -> u64 {
+        match self {
+            Scalar::Unsigned(v) => v,
+            Scalar::Signed(v) => u64::from(v as u32),
+            Scalar::Real(v) => v.to_bits().into(),
+        }
+    }
+
+    /// The nearest number of double precision.
+    pub fn number(self) -> f64 {
+        match self {
+            Scalar::Unsigned(v) => v as f64,
+            Scalar::Signed(v) => v.into(),
+            Scalar::Real(v) => v.into(),
+        }
+    }
+}
+
 /// Decimal, in the shortest form that reads back as the same value.
 impl fmt::Display for Scalar {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -5,7 +5,9 @@ use std::ops::{BitAnd, BitOr, BitOrAssign};
 
 use serde::{Serialize, Serializer};
 
-use crate::trace::columns::OptionalValues;
+use crate::trace::cells::{Cells, ChannelColumn, CoverageColumn};
+use crate::trace::column::{Column, Scalar};
+use crate::trace::columns::{ColumnId, OptionalValues, columns, with_probe};
 
 /// The most samples a pixel can have.
 pub const MAX_SAMPLES: u32 = 64;
@@ -186,6 +188,28 @@ pub struct Fragment {
     #[serde(flatten)]
     pub optional: OptionalValues,
 }
+
+/// Makes a fragment's values of the table of columns.
+macro_rules! values {
+    (
+        { $($id:ident $name:ident: $type:ty, [$($place:tt)+], $check:ident,
+            $unit:literal, $what:literal;)* }
+        { $($oid:ident $oname:ident: $otype:ty = $default:expr, $ocheck:ident,
+            $ounit:literal, $owhat:literal;)* }
+    ) => {
+        impl Fragment {
+            /// Its value of `column`.
+            #[inline]
+            pub fn value(&self, column: ColumnId) -> Scalar {
+                match column {
+                    $(ColumnId::$id => <$type as Cells>::scalar(self.$($place)+),)*
+                    $(ColumnId::$oid => <$otype as Cells>::scalar(self.optional.$oname),)*
+                }
+            }
+        }
+    };
+}
+columns!(values);
 
 #[cfg(test)]
 mod tests {

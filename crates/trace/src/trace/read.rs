@@ -250,6 +250,12 @@ impl Trace {
         &self.inner.stored.extra
     }
 
+    /// The keys of its metadata that are not the format's, but other programs'.
+    pub fn extra_metadata(&self) -> impl Iterator<Item = &str> {
+        let keys = self.inner.metadata.keys().map(String::as_str);
+        keys.filter(|key| !key.starts_with("screendoor."))
+    }
+
     /// The columns that are stored in another type than they are read as: name, the type in
     /// the file, the type read.
     pub fn converted_columns(&self) -> impl Iterator<Item = (&'static str, String, ValueType)> {

@@ -47,10 +47,6 @@ pub struct View {
 /// What the keys of a view begin with; no other keys do.
 const PREFIX: &str = "screendoor.view.";
 
-/// They are there together or not at all.
-const KEYS: [&str; 5] =
-    [key::PROJECTION, key::NEAR, key::FAR, key::WORLD_TO_VIEW, key::VIEW_TO_CLIP];
-
 mod key {
     pub(super) const PROJECTION: &str = "screendoor.view.projection";
     pub(super) const NEAR: &str = "screendoor.view.near";
@@ -78,6 +74,10 @@ struct Fault {
 }
 
 impl View {
+    /// The keys of its entries in a file: they are there together or not at all.
+    pub(crate) const KEYS: [&str; 5] =
+        [key::PROJECTION, key::NEAR, key::FAR, key::WORLD_TO_VIEW, key::VIEW_TO_CLIP];
+
     /// Checks the rules that its fields' types do not enforce.
     ///
     /// # Errors
@@ -167,7 +167,7 @@ impl View {
     }
 
     /// The entries of the schema's metadata.
-    pub(super) fn to_metadata(self) -> impl Iterator<Item = (&'static str, String)> {
+    pub(crate) fn to_metadata(self) -> impl Iterator<Item = (&'static str, String)> {
         let number = |v: &f64| format!("{v:?}");
         let matrix = |m: &[f64; 16]| m.iter().map(number).collect::<Vec<_>>().join(" ");
         let values = [
@@ -177,7 +177,7 @@ impl View {
             matrix(&self.world_to_view),
             matrix(&self.view_to_clip),
         ];
-        KEYS.into_iter().zip(values)
+        Self::KEYS.into_iter().zip(values)
     }
 
     /// Reads it back, where there is one.
@@ -185,11 +185,11 @@ impl View {
         if !reader.map.keys().any(|key| View::has_key(key)) {
             return Ok(None);
         }
-        if let Some(key) = KEYS.into_iter().find(|key| !reader.map.contains_key(*key)) {
+        if let Some(key) = Self::KEYS.into_iter().find(|key| !reader.map.contains_key(*key)) {
             return Err(Error::invalid(
                 reader.place,
                 format_args!("the metadata '{key}' is missing"),
-                format_args!("a view has all of {}, or is left out", KEYS.join(", ")),
+                format_args!("a view has all of {}, or is left out", Self::KEYS.join(", ")),
             ));
         }
         let name = reader.text(key::PROJECTION)?;
