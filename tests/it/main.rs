@@ -2,6 +2,7 @@
 
 mod blended;
 mod browser;
+mod c_header;
 mod cli;
 mod colour;
 mod comparisons;
