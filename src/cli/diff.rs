@@ -124,10 +124,13 @@ fn told(first: &FirstDifference) -> String {
     match (rows, fragments) {
         ([Some(a), Some(b)], [Some(of_a), Some(of_b)]) => {
             let differs = |id: &ColumnId| columns.contains(&id.name());
-            let values = ColumnId::ALL
-                .into_iter()
-                .filter(differs)
-                .map(|id| format!("{} {} | {}", id.name(), of_a.value(id), of_b.value(id)));
+            let values = ColumnId::ALL.into_iter().filter(differs).map(|id| {
+                let [a, b] = [of_a, of_b].map(|fragment| match (id.kind(), fragment.value(id)) {
+                    (ColumnKind::Mask, Scalar::Unsigned(mask)) => format!("{mask:#x}"),
+                    (_, value) => value.to_string(),
+                });
+                format!("{} {a} | {b}", id.name())
+            });
             let values: Vec<String> = values.collect();
             format!("{place} (rows {a} | {b}): {}", values.join(", "))
         }

@@ -16,12 +16,12 @@ use screendoor::trace::{Checksums, ColourFormat, Fragment, Header, Projection, T
 
 use crate::util::{self, design, picture, random_fragments};
 
-fn place(name: &str) -> PathBuf {
+pub fn place(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
 }
 
 /// The compiler that `variable` names, or the system's own.
-fn compiler(variable: &str, own: &str) -> Option<String> {
+pub fn compiler(variable: &str, own: &str) -> Option<String> {
     let name = std::env::var(variable).unwrap_or(own.into());
     let found = Command::new(&name).arg("--version").output();
     if found.is_ok_and(|output| output.status.success()) {

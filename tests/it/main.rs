@@ -30,6 +30,7 @@ mod optional;
 mod python;
 mod results_document;
 mod seal;
+mod shader_twins;
 mod splats;
 mod stress;
 mod trace_file;

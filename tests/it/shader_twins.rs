@@ -192,7 +192,19 @@ fn hlsl_records_what_wgsl_records() {
 
 #[test]
 fn the_twins_declare_one_record() {
-    let words = ["pixel", "primitive", "object", "coverage", "z", "dzdx", "dzdy", "red", "green", "blue", "alpha"];
+    let words = [
+        "pixel",
+        "primitive",
+        "object",
+        "coverage",
+        "z",
+        "dzdx",
+        "dzdy",
+        "red",
+        "green",
+        "blue",
+        "alpha",
+    ];
     let read = |name: &str| fs::read_to_string(place("crates/gpu/src/shaders").join(name)).unwrap();
     let members = |text: &str| -> Vec<String> {
         let body = text.split("struct CapturedFragment {").nth(1).unwrap();

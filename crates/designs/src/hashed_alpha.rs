@@ -8,8 +8,10 @@
 //! still picture, without the stability that is the method's aim.
 //!
 //! What renderers of Gaussian splats ship is the same test against other numbers (`noise`,
-//! `power`): StochasticSplats, nvpro's sample and Spark hash pixel, sample and primitive, which
-//! is white noise; PlayCanvas (pull request 9443) takes a mask of blue noise, moved for each
+//! `power`). StochasticSplats (Kheradmand et al. 2025; `splat_frag_ST.glsl`), nvpro's
+//! `vk_gaussian_splatting` and Spark 0.1 hash pixel, frame and primitive, each by its own formula;
+//! the first puts pixel and sample into one word and adds the primitive before it hashes, so that
+//! primitive p + 1 has at a pixel the number that p has at the next one to the right; PlayCanvas (pull request 9443) takes a mask of blue noise, moved for each
 //! primitive along its diagonal, to the power of 2.2. In steps of the mask's texels there are
 //! 32 places, so that more than half of all neighbours in the file share theirs and hide each
 //! other; and the power lets an alpha of 0.1 pass a third of the time.
@@ -21,7 +23,7 @@ use screendoor_rop::{
 };
 use screendoor_trace::error::Result;
 use screendoor_trace::param::{Typed, Values};
-use screendoor_trace::random::hash;
+use screendoor_trace::random::{hash, mix};
 use screendoor_trace::trace::{Fragment, SampleMask};
 
 screendoor_trace::options! {
@@ -36,7 +38,10 @@ screendoor_trace::options! {
     /// Where the random numbers come from.
     pub enum Noise {
         Place = "place": "a hash of where the fragment lies, at two scales, as published",
-        Primitive = "primitive": "a hash of pixel, sample and primitive, as StochasticSplats, nvpro and Spark have it",
+        Primitive = "primitive": "a hash of pixel, sample and primitive: white noise",
+        StochasticSplats = "stochasticsplats": "the hash of StochasticSplats, of pixel and sample in one word plus the primitive",
+        Nvpro = "nvpro": "the hash of nvpro's vk_gaussian_splatting; each sample is a frame of its own",
+        Spark = "spark": "the hash of Spark 0.1; each sample is a frame of its own",
         Mask = "mask": "a mask of blue noise, moved by the primitive to one of 32 places, as PlayCanvas has it",
     }
 }
@@ -69,7 +74,11 @@ impl Blueprint for HashedAlpha {
             depth_bits::PARAM.param,
             colour::PARAM.param,
         ],
-        combinations: &["noise=mask,power=2.2", "noise=primitive,threshold=pixel"],
+        combinations: &[
+            "noise=mask,power=2.2",
+            "noise=primitive,threshold=pixel",
+            "noise=stochasticsplats,threshold=pixel",
+        ],
     };
 
     type At<const N: usize> = Stochastic<HashedThreshold, N>;
@@ -90,7 +99,8 @@ impl Blueprint for HashedAlpha {
         let apart = depth_bits::tells_apart(values);
         // Surfaces of one object that lie within a cell share their threshold, as do primitives
         // whose masks lie at one place; a hash of the primitive is new for each.
-        let independent = values.get(NOISE) == Noise::Primitive && values.get(POWER) == 1.0;
+        let hashed = !matches!(values.get(NOISE), Noise::Place | Noise::Mask);
+        let independent = hashed && values.get(POWER) == 1.0;
         Promises {
             unbiased: Promise::always_if(apart && independent),
             consistent: Promise::always_if(
@@ -123,11 +133,25 @@ const MOVED: f64 = 0.013;
 impl HashedThreshold {
     /// What alpha is compared with, 0 to 1, for `sample` of a fragment.
     fn threshold(&self, seed: u32, site: Site, fragment: &Fragment, sample: u32) -> f64 {
+        let (x, y, primitive) = (u32::from(site.x), u32::from(site.y), fragment.primitive);
         let uniform = match self.noise {
             Noise::Place => self.at_place(seed, site, fragment, sample),
-            Noise::Primitive => {
-                let pixel = [u32::from(site.x), u32::from(site.y)];
-                fraction(hash([seed, pixel[0], pixel[1], sample, fragment.primitive]))
+            Noise::Primitive => fraction(hash([seed, x, y, sample, primitive])),
+            Noise::StochasticSplats => {
+                let packed = x ^ y << 20 ^ sample << 8;
+                fraction(mix(packed.wrapping_add(primitive).wrapping_add(hash([seed]))))
+            }
+            Noise::Nvpro => {
+                let pixel = xxhash32([x, y, hash([seed, sample])]);
+                // The last is the number of the triangle of a splat's quad; a trace has one
+                // fragment of both.
+                fraction(pcg(xxhash32([pixel, primitive, 0])))
+            }
+            Noise::Spark => {
+                let times = |word: u32, factor: u32| word.wrapping_mul(factor);
+                let terms =
+                    [times(x, 0x9e37_79b9), times(y, 0x85eb_ca6b), times(primitive, 0xc2b2_ae35)];
+                fraction(pcg(terms.into_iter().fold(hash([seed, sample]), u32::wrapping_add)))
             }
             Noise::Mask => {
                 // A frame's jitter in the shader; here each sample is a frame of its own.
@@ -179,6 +203,26 @@ fn fraction(word: u32) -> f64 {
     (f64::from(word) + 0.5) / 2_f64.powi(32)
 }
 
+/// xxHash's 32-bit hash of three words, as shaders have it (Jarzynski, Olano: Hash Functions for
+/// GPU Rendering, JCGT 2020, supplement).
+fn xxhash32([x, y, z]: [u32; 3]) -> u32 {
+    const PRIMES: [u32; 4] = [2_246_822_519, 3_266_489_917, 668_265_263, 374_761_393];
+    let [second, third, fourth, fifth] = PRIMES;
+    let round = |h: u32| h.rotate_left(17).wrapping_mul(fourth);
+    let h = round(z.wrapping_add(fifth).wrapping_add(x.wrapping_mul(third)));
+    let h = round(h.wrapping_add(y.wrapping_mul(third)));
+    let h = (h ^ h >> 15).wrapping_mul(second);
+    let h = (h ^ h >> 13).wrapping_mul(third);
+    h ^ h >> 16
+}
+
+/// A step of PCG and its output (RXS-M-XS, 32 bits; O'Neill 2014).
+fn pcg(word: u32) -> u32 {
+    let state = word.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+    let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
+    word >> 22 ^ word
+}
+
 /// Makes a weighted mean of two uniform numbers uniform: its distribution function,
 /// where the smaller weight is `a` (I3D 2017, section 3.3).
 fn uniform(x: f64, a: f64) -> f64 {
@@ -215,10 +259,12 @@ impl<const N: usize> Sampler<N> for HashedThreshold {
     ) -> SampleMask {
         let opacity = Threshold::of(fragment.alpha);
         let passes = |sample: u32, probe: &mut P| {
-            // Of a place two, one for each scale; a mask is looked up.
+            // Of a place two, one for each scale; nvpro's is a hash of a hash of a hash; a mask is
+            // looked up.
             probe.hashed(match self.noise {
                 Noise::Place => 2,
-                Noise::Primitive => 1,
+                Noise::Nvpro => 3,
+                Noise::Primitive | Noise::StochasticSplats | Noise::Spark => 1,
                 Noise::Mask => 0,
             });
             let threshold = self.threshold(round.seed, site, fragment, sample);
@@ -266,6 +312,9 @@ mod tests {
         let site = |i: u16| Site { x: i % 64, y: i / 64 };
         for (noise, power) in [
             (Noise::Primitive, 1.0),
+            (Noise::StochasticSplats, 1.0),
+            (Noise::Nvpro, 1.0),
+            (Noise::Spark, 1.0),
             (Noise::Mask, 1.0),
             (Noise::Mask, 2.2),
             (Noise::Primitive, 2.2),
@@ -283,6 +332,27 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn shipped_hashes_are_those_of_their_shaders() {
+        // Computed by hand from the shaders' texts, in another language.
+        assert_eq!(xxhash32([0, 0, 0]), 0xa5e2b579);
+        assert_eq!(xxhash32([1, 2, 3]), 0x0e7ee77e);
+        assert_eq!([pcg(0), pcg(1)], [0x07bb2fe2, 0xa8beea3c]);
+        let of = |primitive: u32, x: u16, sample: u32| {
+            let fragment = Fragment { primitive, ..Fragment::default() };
+            threshold(Noise::StochasticSplats, 1.0).threshold(
+                9,
+                Site { x, y: 5 },
+                &fragment,
+                sample,
+            )
+        };
+        // What the sum in front of the hash makes equal, which white noise would not.
+        assert_eq!(of(7, 10, 0), of(6, 11, 0));
+        assert_eq!(of(7 + 256, 10, 0), of(7, 10, 1));
+        assert_ne!(of(7, 10, 0), of(7, 11, 0));
     }
 
     #[test]

@@ -7,6 +7,12 @@
 //! the depths takes one more pass over the trace here, which is none of the design's;
 //! and since a trace stands in another order than the sorted one, each pixel's
 //! fragments are kept until they can be sorted, which is none of its state.
+//!
+//! With `stop` it ends where little light is left, as the reference rasteriser of Gaussian
+//! splats does (Kerbl et al. 2023, `forward.cu`: 1e-4): front to back, the first fragment that
+//! would leave less than that is not drawn, nor is what lies behind it, per sample here as a
+//! pixel has one there. Splats have an alpha of 0.99 at most; of an alpha of 1, which leaves
+//! nothing, is drawn what it covers.
 
 use std::cmp::Reverse;
 use std::sync::Arc;
@@ -17,11 +23,18 @@ use screendoor_rop::{
 };
 use screendoor_rop::{colour, over_opaque};
 use screendoor_trace::error::Result;
-use screendoor_trace::param::Values;
+use screendoor_trace::param::{Typed, Values};
 use screendoor_trace::trace::{Fragment, SampleMask};
 
 /// The design's entry in the registry.
 pub struct SortedBlend;
+
+const STOP: Typed<f64> = Typed::real(
+    "stop",
+    "0",
+    (0.0, 0.5),
+    "what would leave less light than this is not drawn, nor what lies behind; 1e-4 for splats",
+);
 
 impl Blueprint for SortedBlend {
     const INFO: Info = Info {
@@ -29,7 +42,7 @@ impl Blueprint for SortedBlend {
         family: Family::Blended,
         summary: "alpha blending of primitives sorted far to near by the application, each by its mean depth",
         citation: "Newell, Newell, Sancha: A Solution to the Hidden Surface Problem, ACM 1972, without its splitting",
-        params: &[over_opaque::PARAM.param, colour::PARAM.param],
+        params: &[STOP.param, over_opaque::PARAM.param, colour::PARAM.param],
         combinations: &[],
     };
 
@@ -40,7 +53,8 @@ impl Blueprint for SortedBlend {
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
         let opaque = over_opaque::on(values, frame);
         let depths = frame.primitive_depths.clone().unwrap_or_default();
-        let inner = SortedBlendAt { opaque, store: ColourStore::of(values, frame), depths };
+        let stop = values.get(STOP) as f32;
+        let inner = SortedBlendAt { opaque, store: ColourStore::of(values, frame), depths, stop };
         Ok(OverOpaque::new(values, frame, opaque, inner))
     }
 
@@ -62,6 +76,7 @@ pub struct SortedBlendAt<const N: usize> {
     opaque: Opaque,
     store: ColourStore,
     depths: Arc<PrimitiveDepths>,
+    stop: f32,
 }
 
 /// A fragment that waits to be sorted.
@@ -77,10 +92,39 @@ impl<const N: usize> SortedBlendAt<N> {
     /// The fragments blended as they stand, over what lies behind them.
     fn blended(&self, fragments: &[Waiting], behind: &[[f32; 3]; N]) -> BlendBuffer<N> {
         let mut buffer = BlendBuffer { colour: *behind };
-        for f in fragments {
-            buffer.blend(f.coverage, f.colour, f.alpha, self.store);
+        let seen = self.seen(fragments);
+        for (i, f) in fragments.iter().enumerate() {
+            let coverage = seen.get(i).map_or(f.coverage, |seen| *seen);
+            buffer.blend(coverage, f.colour, f.alpha, self.store);
         }
         buffer
+    }
+
+    /// The samples at which each fragment of a list from far to near is drawn; nothing where
+    /// that is all that it covers.
+    fn seen(&self, fragments: &[Waiting]) -> Vec<SampleMask> {
+        if self.stop == 0.0 {
+            return Vec::new();
+        }
+        let (mut left, mut closed) = ([1.0_f32; N], SampleMask::NONE);
+        let mut seen = vec![SampleMask::NONE; fragments.len()];
+        for (f, seen) in fragments.iter().zip(&mut seen).rev() {
+            for sample in f.coverage.iter() {
+                if closed.contains(sample) {
+                    continue;
+                }
+                let after = left[sample] * (1.0 - f.alpha);
+                let ends = after < self.stop;
+                if !ends || f.alpha >= 1.0 {
+                    seen.insert(sample);
+                    left[sample] = after;
+                }
+                if ends {
+                    closed.insert(sample);
+                }
+            }
+        }
+        seen
     }
 }
 

@@ -4,6 +4,7 @@ pub mod damage;
 mod gltf;
 mod hair;
 mod inputs;
+mod lines;
 mod obj;
 mod outside;
 mod pictures;

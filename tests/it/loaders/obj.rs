@@ -100,10 +100,10 @@ fn files_of_ordinary_exporters_are_read() {
     }
     let scene = obj(b"v 0 0 0\nv 1 0 0\nv 0 1 0\no Kn\xf6pfe\nf 1 2 3\n").unwrap();
     assert_eq!(scene.objects[0].name, "Kn\u{f6}pfe");
-    // Lines are not polygons.
-    let scene = obj(format!("{TRIANGLE}l 1 2 3\np 1\nf 1 2\nf 1 2 3\n")).unwrap();
+    // Points are not polygons.
+    let scene = obj(format!("{TRIANGLE}p 1\nf 1 2\nf 1 2 3\n")).unwrap();
     assert_eq!(scene.primitive_count(), 1);
-    warned(&scene, 1, &["3 statements of points and lines"]);
+    warned(&scene, 1, &["2 points and faces of fewer"]);
     // Colours of some vertices, whichever.
     let scene = obj("v 0 0 0\nv 1 0 0 1 0 0\nv 0 1 0 0 0 1\nv 9 9 9\nf 1 2 3\n").unwrap();
     let colours: Vec<Vec3> = mesh(&scene, 0).colours.iter().map(|c| c.truncate()).collect();

@@ -317,11 +317,16 @@ fn obj_cases() -> Vec<Case> {
             ),
         ),
         case("`s` without normals", Says(after("s 1"), "1 faces of smoothing groups lack normals")),
+        case("`l` beside faces", Says(after("l 1 2 3"), "2 lines beside surfaces are not drawn")),
         case(
-            "`p`, `l`, faces of two corners",
+            "`l` without faces",
+            Says(obj(format!("{TRIANGLE}l 1 2 3\n")), "how wide its 2 lines are"),
+        ),
+        case(
+            "`p`, faces of two corners",
             Says(
-                obj(format!("{TRIANGLE}l 1 2 3\np 1\nf 1 2\nf 1 2 3\n")),
-                "3 statements of points and lines are not drawn",
+                obj(format!("{TRIANGLE}p 1\nf 1 2\nf 1 2 3\n")),
+                "2 points and faces of fewer than three corners are not drawn",
             ),
         ),
         case(

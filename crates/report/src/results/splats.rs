@@ -23,9 +23,10 @@ pub(super) fn section(b: &Beyond) -> Section {
     section.paragraph(format!(
         "No publication's: files of trained splats ([SPLATS.md](SPLATS.md)), {} × {} pixels, {} seeds, blended \
          and judged as encoded values, as splats are trained; errors are over the covered pixels, against \
-         the exact picture. `{}` is the white noise that StochasticSplats, nvpro's sample and Spark ship, \
-         `noise=mask` PlayCanvas' mask of blue noise with its 32 places, `power=2.2` the power that it \
-         takes of it. An RMSE below {ROUNDING:.2}, which no 8-bit picture shows, counts as that in any share.",
+         the exact picture. `{}` is white noise, of which the shipped hashes are three kinds \
+         (`noise=stochasticsplats`, `nvpro`, `spark`), `noise=mask` PlayCanvas' mask of blue noise with its 32 places, `power=2.2` the power that it \
+         takes of it; `sorted-blend` sorts splats by their depths, as renderers without noise do, and with \
+         `stop=0.0001` ends where the reference rasteriser does. An RMSE below {ROUNDING:.2}, which no 8-bit picture shows, counts as that in any share.",
         b.side, b.side, study.seeds, study.baseline
     ));
     for missing in &b.missing {
@@ -71,7 +72,7 @@ pub(super) fn in_short(b: &Beyond) -> Vec<Text> {
     };
     let text = format!(
         "**Gaussian splats** ({} scenes, {} × {} pixels, {} seeds): RMSE at {SHOWN} samples as a share of \
-         that of the white noise that most renderers ship, geometric mean and range: {}.{bias}",
+         that of white noise, geometric mean and range: {}.{bias}",
         results.scenes.len(),
         b.side,
         b.side,

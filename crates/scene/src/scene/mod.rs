@@ -14,6 +14,7 @@ mod folder;
 mod gltf_file;
 mod hair_file;
 mod image_file;
+mod lines;
 mod material;
 mod obj_file;
 mod ply_file;
@@ -265,7 +266,7 @@ impl Scene {
 }
 
 /// How a scene is loaded.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct LoadOptions {
     /// Which grid of a volume to draw; where none is named, its densities.
     pub grid: Option<String>,
@@ -274,6 +275,9 @@ pub struct LoadOptions {
     /// Which way is up in a file that does not say; where not given, as its format has it by
     /// habit.
     pub axes: Option<Axes>,
+    /// How wide lines are drawn, in the scene's units. Where not given, lines beside surfaces
+    /// are not drawn, and others as wide as suits their extent.
+    pub line_width: Option<f64>,
 }
 
 /// What is told of SPZ files: of all formats the one whose files do not keep to its text.
@@ -292,7 +296,8 @@ pub fn load(source: &str) -> Result<Scene> {
 /// whose ending says its format. Nothing outside the file's folder is opened.
 ///
 /// # Errors
-/// [`Error::Config`] for an unknown built-in or ending, or a grid that is not there,
+/// [`Error::Config`] for an unknown built-in or ending, a grid that is not there, or a width of
+/// lines where there are none,
 /// [`Error::Io`] where the file cannot be read, [`Error::Invalid`] where it is damaged or
 /// holds nothing to draw.
 pub fn load_with(source: &str, options: &LoadOptions) -> Result<Scene> {
@@ -330,6 +335,7 @@ pub fn load_with(source: &str, options: &LoadOptions) -> Result<Scene> {
             scene
         }
     };
+    scene.widen_lines(options.line_width)?;
     if scene.materials.is_empty() {
         scene.materials.push(Material::default());
     }

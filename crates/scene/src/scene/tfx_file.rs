@@ -9,6 +9,7 @@ use std::path::Path;
 use glam::{Vec3, Vec4};
 
 use crate::scene::bytes::Bytes;
+use crate::scene::lines::SHARE;
 use crate::scene::{Material, Scene, Shape, Strands, View, file, file_name};
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::random::Stream;
@@ -16,9 +17,7 @@ use screendoor_trace::random::Stream;
 /// The file says nothing of these: brown, half see-through.
 const COLOUR: [f32; 3] = [0.22, 0.10, 0.045];
 const ALPHA: f32 = 0.5;
-/// Half of a strand's width, as a share of the diagonal of the box that holds the
-/// hair, and how much thinner its tip is.
-const RADIUS: f32 = 0.0012;
+/// How much thinner a strand's tip is than its root.
 const TIP: f32 = 0.4;
 /// The most points that are read.
 const MAX_POINTS: usize = 1 << 26;
@@ -52,7 +51,7 @@ pub(super) fn load(path: &Path) -> Result<Scene> {
     }
     let finite = || points.iter().copied().filter(|p| p.is_finite());
     let (low, high) = (finite().fold(Vec3::MAX, Vec3::min), finite().fold(Vec3::MIN, Vec3::max));
-    let radius = RADIUS * (high - low).length();
+    let radius = SHARE / 2.0 * (high - low).length();
     if !(radius.is_normal() && radius > 0.0) {
         let what = "its strands have no finite length";
         return Err(Error::invalid(&place, what, "export it again"));

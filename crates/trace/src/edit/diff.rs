@@ -93,9 +93,9 @@ pub fn header_differences(a: &Header, b: &Header) -> Vec<HeaderDifference> {
             pattern.positions.iter().map(|[x, y]| format!("{x},{y}")).collect();
         let optional: Vec<&str> = header.optional.iter().map(|id| id.name()).collect();
         let view = View::KEYS.map(|key| {
-            let said = header.view.and_then(|view| {
-                view.to_metadata().into_iter().find(|(own, _)| *own == key)
-            });
+            let said = header
+                .view
+                .and_then(|view| view.to_metadata().into_iter().find(|(own, _)| *own == key));
             let name = key.trim_start_matches("screendoor.");
             (name, said.map_or("none".to_string(), |(_, text)| text), true)
         });

@@ -69,7 +69,7 @@ pub fn cases() -> Vec<Case> {
         case("Triangle strips", |m| of_mode(m, 5, &[0, 1, 3, 2]), white),
         case("Triangle fans", |m| of_mode(m, 6, &[0, 1, 2, 3]), white),
         told("Points", "points are not drawn (4 points)", |m| m.another(0)),
-        told("Lines", "lines are not drawn (9 lines)", |m| {
+        told("Lines", "9 lines beside surfaces are not drawn", |m| {
             (1..=3).for_each(|mode| m.another(mode))
         }),
         told(

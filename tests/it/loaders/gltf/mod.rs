@@ -3,7 +3,7 @@
 mod core_rows;
 mod extension_rows;
 mod inputs;
-mod model;
+pub mod model;
 mod table;
 
 use glam::{Vec2, Vec3};

@@ -10,7 +10,7 @@ use super::material::{Made, SETS};
 use super::pose::{Bound, Joints, Set, normal_matrix};
 use super::splats;
 use super::warnings::Matter;
-use crate::scene::{Mesh, Shape};
+use crate::scene::{Mesh, Shape, Strands};
 use screendoor_trace::error::Result;
 
 /// A mesh as a node shows it.
@@ -168,6 +168,7 @@ impl Loader<'_> {
                 indices.windows(3).enumerate().map(flip).collect()
             }
             Mode::Fan => indices.windows(2).skip(1).map(|t| [indices[0], t[0], t[1]]).collect(),
+            Mode::Lines => Vec::new(),
             _ => indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
         };
         let in_scene = match joints {
@@ -179,12 +180,60 @@ impl Loader<'_> {
                 self.warnings.matter("primitives that no joint holds stand without their skin"),
             );
         }
-        let Vertices { positions, normals, uvs: [uvs, more_uvs], colours } = vertices;
-        let items = triangles.len();
         let material = made.material;
-        let mesh = Mesh { positions, normals, uvs, more_uvs, colours, triangles, material };
-        self.scene.shapes.push(Shape::Mesh(mesh));
+        let (shape, items) = if mode == Mode::Lines {
+            let strands = self.curves(primitive.mode, &vertices, &indices, part)?;
+            let items = strands.segment_count();
+            (Shape::Strands(Strands { material, ..strands }), items)
+        } else {
+            let Vertices { positions, normals, uvs: [uvs, more_uvs], colours } = vertices;
+            let items = triangles.len();
+            let mesh = Mesh { positions, normals, uvs, more_uvs, colours, triangles, material };
+            (Shape::Mesh(mesh), items)
+        };
+        self.scene.shapes.push(shape);
         Ok(Drawn { shape: Some(self.scene.shapes.len() - 1), items, matters, in_scene })
+    }
+
+    /// The curves of a primitive of lines, a loop or a strip. Lines that begin where the one
+    /// before ends are one curve.
+    fn curves(
+        &mut self,
+        mode: Option<u32>,
+        vertices: &Vertices,
+        indices: &[u32],
+        part: &str,
+    ) -> Result<Strands> {
+        let count = vertices.positions.len();
+        if let Some(index) = indices.iter().find(|i| **i as usize >= count) {
+            let what = format!("it names vertex {index}, of {count}");
+            return Err(self.bad(part, what, "export the file again"));
+        }
+        if ![0, count].contains(&vertices.colours.len()) {
+            let what = format!("{} of its {count} vertices have colours", vertices.colours.len());
+            return Err(self.bad(part, what, "export the file again"));
+        }
+        let curves: Vec<Vec<u32>> = match mode {
+            Some(1) => {
+                let mut curves: Vec<Vec<u32>> = Vec::new();
+                for pair in indices.chunks_exact(2) {
+                    match curves.last_mut() {
+                        Some(last) if last.last() == pair.first() => last.push(pair[1]),
+                        _ => curves.push(pair.to_vec()),
+                    }
+                }
+                curves
+            }
+            Some(2) => vec![indices.iter().chain(indices.first()).copied().collect()],
+            _ => vec![indices.to_vec()],
+        };
+        let mut strands = Strands::default();
+        for curve in curves {
+            let points: Vec<Vec3> = curve.iter().map(|i| vertices.positions[*i as usize]).collect();
+            let colours = curve.iter().filter_map(|i| vertices.colours.get(*i as usize).copied());
+            strands.add_line(&points, &colours.collect::<Vec<_>>());
+        }
+        Ok(strands)
     }
 
     /// Why nothing is drawn of a primitive, where that is so.
@@ -196,7 +245,6 @@ impl Loader<'_> {
     ) -> Option<Matter> {
         match mode {
             Mode::Points => return Some(self.warnings.matter_of(unit, "points are not drawn")),
-            Mode::Lines => return Some(self.warnings.matter_of(unit, "lines are not drawn")),
             _ => {}
         }
         let position = primitive.attributes.get("POSITION");

@@ -23,14 +23,14 @@ const FREE_FORM: [&str; 18] = [
 /// Vertex colours above this are numbers of bytes.
 const MAX_COLOUR: f32 = 2.0;
 
-/// A run of faces of one name and one material, which becomes an object.
+/// A run of faces and lines of one name and one material, which becomes an object of each.
 #[derive(Clone, Default)]
 pub(super) struct Segment {
     pub name: String,
     /// Which of the scene's materials; `None` where the file says none.
     pub material: Option<usize>,
-    /// Its first face.
-    pub first: usize,
+    /// Its first face, and its first line.
+    pub first: [usize; 2],
 }
 
 /// A face: corners from where the one before ends.
@@ -53,6 +53,10 @@ pub(super) struct Geometry {
     /// Numbers from 1 of a vertex, a texture coordinate and a normal; 0 for none.
     pub corners: Vec<[u32; 3]>,
     pub faces: Vec<Face>,
+    /// Numbers from 1 of the vertices of lines.
+    pub along: Vec<u32>,
+    /// Lines: where each ends in these, and in which line of the file it stands.
+    pub lines: Vec<(usize, usize)>,
     pub segments: Vec<Segment>,
 }
 
@@ -71,7 +75,8 @@ pub(super) struct Reader<'f, 's> {
     /// Vertices with colours.
     coloured: usize,
     smooth: bool,
-    points_and_lines: usize,
+    /// Statements of points, and faces that are none.
+    points: usize,
     free_form: Unread,
     other: Unread,
 }
@@ -89,6 +94,8 @@ impl<'f, 's> Reader<'f, 's> {
                 normals: Vec::new(),
                 corners: Vec::new(),
                 faces: Vec::new(),
+                along: Vec::new(),
+                lines: Vec::new(),
                 segments: vec![unnamed],
             },
             library: Library::new(folder),
@@ -98,7 +105,7 @@ impl<'f, 's> Reader<'f, 's> {
             respelt: Unread::default(),
             coloured: 0,
             smooth: false,
-            points_and_lines: 0,
+            points: 0,
             free_form: Unread::default(),
             other: Unread::default(),
         }
@@ -130,7 +137,8 @@ impl<'f, 's> Reader<'f, 's> {
             "vn" => self.geometry.normals.push(attribute(statement, KINDS[2], 3)?.into()),
             // The second name is that of older files.
             "f" | "fo" => self.face(statement)?,
-            "l" | "p" => self.points_and_lines += 1,
+            "l" => self.line(statement)?,
+            "p" => self.points += 1,
             "s" => {
                 let group = statement.words().next().unwrap_or("off");
                 self.smooth = !matches!(group, "off" | "0" | "null");
@@ -194,7 +202,7 @@ impl<'f, 's> Reader<'f, 's> {
             0 => Err("the face has no corners".to_string()),
             1 | 2 => {
                 self.geometry.corners.truncate(start);
-                self.points_and_lines += 1;
+                self.points += 1;
                 Ok(())
             }
             _ => {
@@ -203,6 +211,22 @@ impl<'f, 's> Reader<'f, 's> {
                 Ok(())
             }
         }
+    }
+
+    fn line(&mut self, statement: &Statement) -> Result<(), String> {
+        let start = self.geometry.along.len();
+        for point in statement.words() {
+            // Texture coordinates along a line are of no use: it is drawn without a texture.
+            let vertex = point.split('/').next().unwrap_or_default();
+            let number = self.index(vertex, 0, statement)?;
+            self.geometry.along.push(number);
+        }
+        let end = self.geometry.along.len();
+        if end < start + 2 {
+            return Err("a line has at least two points".to_string());
+        }
+        self.geometry.lines.push((end, statement.line));
+        Ok(())
     }
 
     /// How many vertices, texture coordinates or normals there are.
@@ -249,15 +273,29 @@ impl<'f, 's> Reader<'f, 's> {
                     *number = 0;
                     continue;
                 }
-                let what = format!("{} {number} is not there, of {}", KINDS[kind], counts[kind]);
-                let place = match self.beyond.take() {
-                    Some((line, place)) if line == face.line => place,
-                    _ => format!("{}, line {}", self.path.display(), face.line),
-                };
-                return Err(self.wrong(place, what));
+                let (line, number) = (face.line, *number);
+                return Err(self.absent(line, kind, number));
+            }
+        }
+        let mut start = 0;
+        for (end, line) in self.geometry.lines.iter().copied() {
+            let along = &self.geometry.along[start..end];
+            start = end;
+            if let Some(number) = along.iter().copied().find(|n| *n as usize > counts[0]) {
+                return Err(self.absent(line, 0, number));
             }
         }
         Ok(())
+    }
+
+    /// The error about a line of the file that names what is not there.
+    fn absent(&mut self, line: usize, kind: usize, number: u32) -> Error {
+        let what = format!("{} {number} is not there, of {}", KINDS[kind], self.count(kind));
+        let place = match self.beyond.take() {
+            Some((first, place)) if first == line => place,
+            _ => format!("{}, line {line}", self.path.display()),
+        };
+        self.wrong(place, what)
     }
 
     fn use_material(&mut self, statement: &Statement) {
@@ -279,9 +317,9 @@ impl<'f, 's> Reader<'f, 's> {
     }
 
     fn begin(&mut self, segment: Segment) {
-        let first = self.geometry.faces.len();
+        let first = [self.geometry.faces.len(), self.geometry.lines.len()];
         let segments = &mut self.geometry.segments;
-        // Names without faces are no objects.
+        // Names without faces and lines are no objects.
         if segments.last().is_some_and(|last| last.first == first) {
             segments.pop();
         }
@@ -306,9 +344,9 @@ impl<'f, 's> Reader<'f, 's> {
         if let Some(named) = self.respelt.named() {
             warn(format!(": materials whose names are spelt otherwise in the MTL file: {named}"));
         }
-        if self.points_and_lines > 0 {
-            let n = self.points_and_lines;
-            warn(format!(": {n} statements of points and lines are not drawn"));
+        if self.points > 0 {
+            let n = self.points;
+            warn(format!(": {n} points and faces of fewer than three corners are not drawn"));
         }
         if let Some(named) = self.free_form.named() {
             warn(format!(

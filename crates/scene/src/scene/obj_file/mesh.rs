@@ -4,9 +4,9 @@ use std::collections::HashMap;
 
 use glam::{DVec3, Vec2, Vec3, Vec4};
 
-use super::geometry::{Face, Geometry, Segment};
+use super::geometry::{Face, Geometry};
 use crate::scene::polygon::{Corner, Cutter};
-use crate::scene::{Mesh, far};
+use crate::scene::{Mesh, Strands, far};
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::picture::srgb;
 
@@ -26,7 +26,8 @@ pub(super) struct Builder<'a> {
 impl<'a> Builder<'a> {
     /// One for the file called `place`.
     pub(super) fn new(place: &'a str, geometry: &'a Geometry) -> Self {
-        let used = geometry.corners.iter().map(|c| geometry.positions[c[0] as usize - 1]);
+        let vertices = geometry.corners.iter().map(|c| c[0]).chain(geometry.along.iter().copied());
+        let used = vertices.map(|vertex| geometry.positions[vertex as usize - 1]);
         let linear = |c: f32| srgb::decode(f64::from(c.clamp(0.0, 1.0))) as f32;
         let colour = |c: &Vec4| c.truncate().map(linear).extend(c.w.clamp(0.0, 1.0));
         Builder {
@@ -39,17 +40,33 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// The mesh of the faces of the segment up to `end`.
+    /// The curves of the lines from `first` to before `end`, which have no width yet.
+    pub(super) fn lines(&self, first: usize, end: usize) -> Strands {
+        let geometry = self.geometry;
+        let mut strands = Strands::default();
+        let mut start = first.checked_sub(1).map_or(0, |before| geometry.lines[before].0);
+        for (behind, _) in &geometry.lines[first..end] {
+            let along = geometry.along[start..*behind].iter().map(|v| *v as usize - 1);
+            start = *behind;
+            let place = |v: usize| (geometry.positions[v] - self.origin).as_vec3();
+            let points: Vec<Vec3> = along.clone().map(place).collect();
+            let colours: Vec<Vec4> = along.filter_map(|v| self.colours.get(v).copied()).collect();
+            strands.add_line(&points, &colours);
+        }
+        strands
+    }
+
+    /// The mesh of the faces from `first` to before `end`.
     ///
     /// # Errors
     /// [`Error::Unsupported`] for a polygon that is too complex.
-    pub(super) fn mesh(&mut self, segment: &Segment, end: usize) -> Result<Mesh> {
+    pub(super) fn mesh(&mut self, first: usize, end: usize) -> Result<Mesh> {
         let mut mesh = Mesh::default();
         let mut known = HashMap::new();
         let faces = &self.geometry.faces;
-        let mut start = segment.first.checked_sub(1).map_or(0, |before| faces[before].end);
+        let mut start = first.checked_sub(1).map_or(0, |before| faces[before].end);
         let mut points = Vec::new();
-        for face in &faces[segment.first..end] {
+        for face in &faces[first..end] {
             let corners = &self.geometry.corners[start..face.end];
             start = face.end;
             self.flat += usize::from(face.smooth && corners.iter().any(|c| c[2] == 0));

@@ -35,20 +35,31 @@ pub(super) fn load(path: &Path, folder: &Folder) -> Result<Scene> {
     let mut builder = Builder::new(&place, &geometry);
     let mut see_through = HashMap::new();
     for (i, segment) in geometry.segments.iter().enumerate() {
-        let end = geometry.segments.get(i + 1).map_or(geometry.faces.len(), |next| next.first);
-        if end == segment.first {
-            continue;
+        let all = [geometry.faces.len(), geometry.lines.len()];
+        let end = geometry.segments.get(i + 1).map_or(all, |next| next.first);
+        let mut shapes = Vec::new();
+        if end[0] > segment.first[0] {
+            shapes.push(Shape::Mesh(builder.mesh(segment.first[0], end[0])?));
         }
-        let mut mesh = builder.mesh(segment, end)?;
-        mesh.material = segment.material.unwrap_or(fallback);
-        if mesh.colours.iter().any(|c| c.w < 1.0) {
-            mesh.material = *see_through
-                .entry(mesh.material)
-                .or_insert_with(|| with_alpha(&mut scene, mesh.material));
+        if end[1] > segment.first[1] {
+            shapes.push(Shape::Strands(builder.lines(segment.first[1], end[1])));
         }
-        scene.add(segment.name.clone(), Shape::Mesh(mesh));
-        if let Some(object) = scene.objects.last_mut() {
-            object.place = DAffine3::from_translation(builder.origin);
+        for mut shape in shapes {
+            let (material, colours) = match &mut shape {
+                Shape::Mesh(mesh) => (&mut mesh.material, &mesh.colours),
+                Shape::Strands(strands) => (&mut strands.material, &strands.colours),
+                _ => continue,
+            };
+            *material = segment.material.unwrap_or(fallback);
+            if colours.iter().any(|c| c.w < 1.0) {
+                *material = *see_through
+                    .entry(*material)
+                    .or_insert_with(|| with_alpha(&mut scene, *material));
+            }
+            scene.add(segment.name.clone(), shape);
+            if let Some(object) = scene.objects.last_mut() {
+                object.place = DAffine3::from_translation(builder.origin);
+            }
         }
     }
     if builder.flat > 0 {
