@@ -234,7 +234,7 @@ fn all_versions_of_spz_say_the_same() {
     for version in 1..=4 {
         let scene = load("a.spz", &spz(version, version > 2)).unwrap();
         // Which way is up the format says and its writers do not heed.
-        warned(&scene, 1, &["--axes"]);
+        warned(&scene, 1, &["say as its axes"]);
         let splats = found(&scene);
         assert_eq!((splats.means.len(), splats.degree), (3, 1), "{version}");
         assert_eq!(splats.means[2], Vec3::new(1.0, 2.0, -1.0));
@@ -310,7 +310,7 @@ fn which_way_is_up_can_be_said() {
         assert_eq!(scene.world, scene.objects[0].place);
     }
     let error = up("a.gltf", Axes::ZUp).unwrap_err().to_string();
-    assert!(error.contains("leave --axes out"), "{error}");
+    assert!(error.contains("leave the axes out"), "{error}");
     let axes = LoadOptions { axes: Some(Axes::ZUp), ..LoadOptions::default() };
     assert!(load_with("builtin:cloth", &axes).is_err());
 }

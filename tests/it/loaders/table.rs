@@ -678,7 +678,10 @@ fn other_cases() -> Vec<Case> {
                 assert_eq!(splats::found(scene).means.len(), 2);
             }),
         ),
-        splat("`.spz` of versions 1 to 4", Says(file("a.spz", splats::spz(3, false)), "--axes")),
+        splat(
+            "`.spz` of versions 1 to 4",
+            Says(file("a.spz", splats::spz(3, false)), "say as its axes"),
+        ),
         splat(
             "`.spz` of versions 1 to 3 that is not compressed",
             Says(file("a.spz", raw), "not compressed by gzip"),

@@ -278,7 +278,7 @@ pub struct LoadOptions {
 
 /// What is told of SPZ files: of all formats the one whose files do not keep to its text.
 const GUESSED: &str = "y is taken to point up, as the format has it, and many writers leave it \
-                       down: --axes y-down or y-up says which";
+                       down: say as its axes y-down or y-up";
 
 /// Loads the scene that `source` names, as [`load_with`] does without options.
 ///
@@ -303,7 +303,7 @@ pub fn load_with(source: &str, options: &LoadOptions) -> Result<Scene> {
     }
     if options.axes.is_some() && !kind.as_deref().is_some_and(source::may_say_up) {
         let what = format_args!("'{source}' says itself which way is up");
-        return Err(Error::config(what, "leave --axes out"));
+        return Err(Error::config(what, "leave the axes out"));
     }
     let mut scene = match source.strip_prefix(BUILTIN) {
         Some(spec) => builtin::build(spec).map_err(|e| no_builtin(source, e))?,

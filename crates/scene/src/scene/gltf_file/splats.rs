@@ -141,10 +141,10 @@ impl Loader<'_> {
         let opacities = opacity.map(|a| self.numbers(a, OPACITY, part)).transpose()?;
         let mut harmonics = Vec::new();
         let mut degree = 0;
-        'degrees: for l in 0..=4_usize {
+        for l in 0..=4_usize {
             let names = (0..=2 * l).map(|n| format!("{NAME}:SH_DEGREE_{l}_COEF_{n}"));
             let accessors: Option<Vec<usize>> = names.map(|name| of.get(&name).copied()).collect();
-            let Some(accessors) = accessors else { break 'degrees };
+            let Some(accessors) = accessors else { break };
             degree = l as u32;
             for accessor in accessors {
                 harmonics.push(self.numbers(accessor, HARMONIC, part)?);
