@@ -134,6 +134,7 @@ fn facts(
         source: header.source.clone(),
         camera: header.camera.clone(),
         view,
+        space: header.space,
         warnings: warnings()?,
         pixel: match entry.pixel {
             Some(pixel) => pixel,
