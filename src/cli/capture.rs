@@ -28,8 +28,10 @@ use crate::trace::{
 /// Draw a scene and record its fragments as a trace
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// A .obj, .gltf, .glb, .ply, .stl, .vdb, .tfx or .hair file, Gaussian splats as .ply, .splat
-    /// or .spz, or builtin:NAME[:parameter=value,…] ('screendoor scenes' lists them)
+    #[arg(help = format!(
+        "A scene's file ({}), or builtin:NAME[:parameter=value,…] ('screendoor scenes' lists them)",
+        scene::endings()
+    ))]
     scene: OsString,
     /// The trace to write
     #[arg(long, short, value_name = "TRACE")]
@@ -218,6 +220,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         splats,
         space: arguments.space,
     };
+    scene.warnings.extend(options.unused(&scene));
     let write = WriteOptions { compression: arguments.compress, ..WriteOptions::default() };
     let reporting = Reporting { scene: &scene, unseen: true, strict: arguments.strict };
     let ((written, unseen), differences) = match &gpu {

@@ -37,6 +37,7 @@ use crate::capture::splat::Painter;
 use crate::capture::unseen::Recorded;
 use crate::scene::Scene;
 use screendoor_trace::error::{Error, Result};
+use screendoor_trace::param::Options;
 use screendoor_trace::picture::Space;
 use screendoor_trace::trace::{
     ColourFormat, ColumnId, Fragment, Header, Scalar, Trace, TraceWriter, WriteOptions,
@@ -99,6 +100,24 @@ impl Default for CaptureOptions {
             splats: SplatRules::default(),
             space: None,
         }
+    }
+}
+
+impl CaptureOptions {
+    /// What of the options changes nothing, since the scene has nothing that it is for.
+    pub fn unused(&self, scene: &Scene) -> Vec<String> {
+        let mut told = Vec::new();
+        if self.faces != Faces::Material && scene.is_all_splats() {
+            told.push(format!(
+                "splats have no sides: faces '{}' changes nothing",
+                self.faces.name()
+            ));
+        }
+        if self.splats != SplatRules::default() && !scene.has_splats() {
+            let rules = self.splats.spec();
+            told.push(format!("the scene has no splats: splat rules '{rules}' change nothing"));
+        }
+        told
     }
 }
 

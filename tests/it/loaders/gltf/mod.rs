@@ -148,6 +148,14 @@ fn splats_of_drafts_are_read_and_what_is_not_known_is_told() {
             json!({ "KHR_gaussian_splatting": { key: value } });
         warned(&model.load().unwrap(), 1, &[says]);
     }
+    // What is no point is no splat, and no triangle either.
+    let mut model = Model::quad();
+    model.another(4);
+    model.json["meshes"][0]["primitives"][1]["extensions"] =
+        json!({ "KHR_gaussian_splatting": {} });
+    let scene = model.load().unwrap();
+    assert_eq!(scene.shapes.len(), 1);
+    warned(&scene, 1, &["KHR_gaussian_splatting is for points"]);
 }
 
 #[test]

@@ -100,14 +100,9 @@ impl Loader<'_> {
                 Err(matter) => return Ok(Err(matter)),
             },
         };
-        let (mut splats, broken, told) = cloud.finish();
+        let (mut splats, told) = cloud.finish();
         self.scene.warnings.extend(told);
         splats.space = space.unwrap_or(Space::Encoded);
-        if broken > 0 {
-            let what = "have no finite place, size, turn, opacity or colour and show nothing";
-            let what = format_args!("{broken} splats of {part} {what}");
-            self.scene.warnings.push(format!("{}: {what}", self.place));
-        }
         Ok(Ok(splats))
     }
 
@@ -177,7 +172,7 @@ impl Loader<'_> {
             harmonics.iter().map(|list| list.arrays(0.0).collect()).collect();
         let colours: Option<Vec<[f32; 4]>> = colours.map(|list| list.arrays(1.0).collect());
         let opacities: Option<Vec<[f32; 1]>> = opacities.map(|list| list.arrays(1.0).collect());
-        let mut cloud = Cloud::new(&self.place, degree, count);
+        let mut cloud = Cloud::new(&format!("{}, {part}", self.place), degree, count);
         let mut own = Vec::new();
         let turns = rotations.arrays(0.0).zip(scales.arrays(0.0)).zip(means.arrays(0.0));
         for (i, (([x, y, z, w], scales), mean)) in turns.enumerate() {

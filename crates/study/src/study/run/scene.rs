@@ -7,7 +7,7 @@ use crate::study::measure::Subject;
 use crate::study::results::SceneFacts;
 use crate::study::run::store::Store;
 use screendoor_designs::REFERENCE;
-use screendoor_scene::capture::{Capture, Chosen};
+use screendoor_scene::capture::{Capture, CaptureOptions};
 use screendoor_scene::scene::Scene;
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::output::OutputFile;
@@ -65,8 +65,8 @@ impl OpenScene {
     }
 }
 
-/// A scene as it is drawn, its camera, and in its warnings what of either is not honoured.
-fn prepared(entry: &SceneEntry, base: &Path) -> Result<(Scene, Chosen)> {
+/// A scene as it is drawn, how, and in its warnings what of either is not honoured.
+fn prepared(entry: &SceneEntry, base: &Path) -> Result<(Scene, CaptureOptions)> {
     let mut scene = entry.load(base)?;
     if let Some(texture) = &entry.texture {
         scene.apply_texture(&base.join(texture))?;
@@ -76,13 +76,14 @@ fn prepared(entry: &SceneEntry, base: &Path) -> Result<(Scene, Chosen)> {
     }
     let mut chosen = entry.camera_choice(base).choose(&scene.cameras)?;
     scene.warnings.append(&mut chosen.warnings);
-    Ok((scene, chosen))
+    let options = entry.options(chosen)?;
+    scene.warnings.extend(options.unused(&scene));
+    Ok((scene, options))
 }
 
 /// Draws a scene into the trace at `path`. Returns what of it is not drawn.
 fn draw(entry: &SceneEntry, base: &Path, path: &Path) -> Result<Vec<String>> {
-    let (mut scene, chosen) = prepared(entry, base)?;
-    let options = entry.options(chosen)?;
+    let (mut scene, options) = prepared(entry, base)?;
     let capture = Capture::new(&scene, &options)?;
     let file = OutputFile::create(path)?;
     let place = path.display().to_string();
