@@ -7,7 +7,7 @@ use clap::Args;
 use serde::Serialize;
 
 use crate::capture::{
-    CameraOptions, Capture, CaptureOptions, Faces, Order, PatternKind, Pose, Poses, SplatRules,
+    CameraChoice, CameraOptions, Capture, CaptureOptions, Faces, Order, PatternKind, SplatRules,
     Unseen,
 };
 use crate::cli::arguments::{self, colour, numbers, option, samples, size};
@@ -28,8 +28,10 @@ use crate::trace::{
 /// Draw a scene and record its fragments as a trace
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// A .obj, .gltf, .glb, .ply, .stl, .vdb, .tfx or .hair file, Gaussian splats as .ply, .splat
-    /// or .spz, or builtin:NAME[:parameter=value,…] ('screendoor scenes' lists them)
+    #[arg(help = format!(
+        "A scene's file ({}), or builtin:NAME[:parameter=value,…] ('screendoor scenes' lists them)",
+        scene::endings()
+    ))]
     scene: OsString,
     /// The trace to write
     #[arg(long, short, value_name = "TRACE")]
@@ -139,7 +141,7 @@ struct Document<'a> {
 }
 
 /// Pixels of a frame of which nothing says the size.
-const DEFAULT_SIZE: (u32, u32) = (800, 800);
+const DEFAULT_SIZE: [u32; 2] = [800, 800];
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let (source, path) = arguments::scene(&arguments.scene)?;
@@ -152,19 +154,20 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     // A misspelt name and a machine without a GPU are told before anything is done.
     scene::check(source)?;
     let splats = SplatRules::parse(&arguments.splat_rules)?;
-    let poses = arguments.camera.as_deref().filter(|name| Poses::is_file(name)).map(|path| {
-        let (width, height) = arguments.size.unwrap_or(DEFAULT_SIZE);
-        Poses::read(path, [width, height])
-    });
-    let poses = poses.transpose()?;
-    let pose = poses.as_ref().map(|all| all.choose(arguments.camera_name.as_deref()));
-    let mut pose = pose.transpose()?.cloned();
+    let choice = CameraChoice {
+        camera: arguments.camera.clone(),
+        name: arguments.camera_name.as_deref(),
+        size: arguments.size.map(<[u32; 2]>::from),
+        default_size: DEFAULT_SIZE,
+    };
+    if choice.name.is_some() && choice.file().is_none() {
+        let what = "--camera-name is for a file of cameras";
+        return Err(Error::config(what, "name the scene's own camera by --camera alone"));
+    }
+    let of_file = choice.file().map(|_| choice.choose(&[])).transpose()?;
     let gpu = arguments.gpu.then(|| Gpu::open(arguments.adapter.as_deref())).transpose()?;
-    let inputs: Vec<&Path> = path
-        .into_iter()
-        .chain(arguments.texture.as_deref())
-        .chain(arguments.camera.as_deref().filter(|name| Poses::is_file(name)))
-        .collect();
+    let inputs: Vec<&Path> =
+        path.into_iter().chain(arguments.texture.as_deref()).chain(choice.file()).collect();
     let outputs: Vec<&Path> =
         [&*arguments.output].into_iter().chain(arguments.json.path()).collect();
     check(&inputs, &outputs)?;
@@ -179,7 +182,6 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     };
     let mut scene = scene::load_with(source, &load)?;
     drop(loading);
-    scene.warnings.extend(poses.into_iter().flat_map(|poses| poses.warnings));
     if let Some(texture) = &arguments.texture {
         scene.apply_texture(texture)?;
     }
@@ -187,17 +189,12 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     if arguments.white {
         scene.whiten();
     }
-    if let Some(name) = arguments.camera.as_deref().filter(|name| !Poses::is_file(name)) {
-        if arguments.camera_name.is_some() {
-            let what = "--camera-name is for a file of cameras";
-            return Err(Error::config(what, "name the scene's own camera by --camera alone"));
-        }
-        let (width, height) = arguments.size.unwrap_or(DEFAULT_SIZE);
-        let name = name.to_string_lossy();
-        pose = Some(Pose::of_file(&scene.cameras, &name, [width, height])?);
-    }
-    let own_size = pose.as_ref().map(|pose| (pose.size[0], pose.size[1]));
-    let (width, height) = arguments.size.or(own_size).unwrap_or(DEFAULT_SIZE);
+    let chosen = match of_file {
+        Some(chosen) => chosen,
+        None => choice.choose(&scene.cameras)?,
+    };
+    scene.warnings.extend(chosen.warnings);
+    let [width, height] = chosen.size;
     let options = CaptureOptions {
         width,
         height,
@@ -218,12 +215,12 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
             angle: arguments.angle,
             distance: arguments.distance,
             field_of_view: arguments.fov,
-            pose,
-            ..CameraOptions::default()
+            pose: chosen.pose,
         },
         splats,
         space: arguments.space,
     };
+    scene.warnings.extend(options.unused(&scene));
     let write = WriteOptions { compression: arguments.compress, ..WriteOptions::default() };
     let reporting = Reporting { scene: &scene, unseen: true, strict: arguments.strict };
     let ((written, unseen), differences) = match &gpu {

@@ -30,7 +30,7 @@ impl Kind {
             "json" | "jsonl" => Kind::Json,
             "md" => Kind::Markdown,
             "html" | "htm" => Kind::Page,
-            ending if scene::ENDINGS.contains(&ending) => Kind::Scene,
+            _ if scene::is_scene(path) => Kind::Scene,
             _ => return None,
         })
     }

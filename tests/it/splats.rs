@@ -130,7 +130,7 @@ fn the_trace_says_in_what_space_it_is_blended() {
     };
     scene.add("triangle", Shape::Mesh(triangle));
     let error = Capture::new(&scene, &options).map(|_| ()).unwrap_err().to_string();
-    assert!(error.contains("--space"), "{error}");
+    assert!(error.contains("say as its space"), "{error}");
     for space in [Space::Linear, Space::Encoded] {
         options.space = Some(space);
         let both = fragments(&scene, &options);

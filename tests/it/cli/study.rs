@@ -403,6 +403,26 @@ fn what_can_be_found_out_is_before_the_first_run_and_leaves_no_folder() {
         assert!(error.contains("scene '") && error.lines().count() == 1, "{error}");
         assert!(!place.path("out").exists(), "{to}");
     }
+    let camera = "source = 'surf.obj'\ncamera = 'c.json'";
+    for (more, code, says) in [
+        ("camera = 'no.json'", 1, "no.json: No such file"),
+        ("camera = 'bad.json'", 1, "bad.json: it is no JSON"),
+        ("camera_name = 'b'", 2, "unknown camera 'b'"),
+        ("size = [40, 40]", 2, "is one of 24x16 pixels, and not of the shape of 40x40"),
+        ("pixel = [24, 0]", 2, "'pixel' cannot be 24, 0"),
+    ] {
+        let key = more.split(' ').next().unwrap();
+        let lines = match key {
+            "camera" => format!("source = 'surf.obj'\n{more}"),
+            _ => format!("{camera}\n{more}"),
+        };
+        let place = with_camera(&lines);
+        fs::write(place.path("bad.json"), "{").unwrap();
+        let (found, error) = place.bad(&["study", "s.toml", "-o", "out"]);
+        assert!(found == code && error.contains(says), "{more}: {found}: {error}");
+        assert!(error.contains("scene 'ramps'") && !error.contains("--"), "{error}");
+        assert!(error.lines().count() == 1 && !place.path("out").exists(), "{error}");
+    }
     if cfg!(target_os = "linux") {
         let place = with_study(&[("timing = 0", "timing = 0\nengines = ['fast', 'gpu']")]);
         let output = Command::new(PROGRAM)
@@ -416,6 +436,60 @@ fn what_can_be_found_out_is_before_the_first_run_and_leaves_no_folder() {
         assert!(error.contains("engine 'gpu'") && error.contains("no adapter"), "{error}");
         assert!(!output.status.success() && !place.path("out").exists());
     }
+}
+
+/// A camera of 24 x 16 pixels that stands so far before a triangle.
+fn camera(place: &Workplace, distance: f64) {
+    let matrix = format!("[[1,0,0,0],[0,1,0,0],[0,0,1,{distance}],[0,0,0,1]]");
+    let frame = format!(r#"{{"file_path": "a", "transform_matrix": {matrix}}}"#);
+    let text = format!(r#"{{"fl_x": 20, "w": 24, "h": 16, "k1": 0.1, "frames": [{frame}]}}"#);
+    fs::write(place.path("c.json"), text).unwrap();
+}
+
+/// The study with `lines` in place of what its second scene says of source and size.
+fn with_camera(lines: &str) -> Workplace {
+    let place = with_study(&[("source = 'builtin:ramps'\nsize = [32, 32]", lines)]);
+    fs::write(place.path("surf.obj"), "v -1 -1 0\nv 1 -1 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    camera(&place, 3.0);
+    place
+}
+
+#[test]
+fn a_camera_of_a_file_has_its_frame_and_stays_the_same() {
+    let lines = "source = 'surf.obj'\ncamera = 'c.json'";
+    let facts = |place: &Workplace| -> Value {
+        serde_json::from_slice(&fs::read(place.path("out/scenes/ramps.json")).unwrap()).unwrap()
+    };
+    // What is said comes before what the camera has, whatever is said.
+    for (more, size) in [("", [24, 16]), ("\nsize = [48, 32]", [48, 32])] {
+        let place = with_camera(&format!("{lines}{more}"));
+        place.good(&["study", "s.toml", "-o", "out"]);
+        let facts = facts(&place);
+        assert_eq!((&facts["size"][0], &facts["size"][1]), (&size[0].into(), &size[1].into()));
+        assert_eq!(facts["camera"], "camera a");
+        assert!(facts["warnings"][0].as_str().unwrap().contains("distortion"), "{facts}");
+    }
+
+    let place = with_camera(lines);
+    place.good(&["study", "s.toml", "-o", "out"]);
+    let (before, told) = (results(&place.path("out")), facts(&place)["warnings"].clone());
+    let run = place.path("out/runs/ramps.8.lk.json");
+    // With another camera since, what is measured is what was drawn.
+    camera(&place, 4.0);
+    fs::remove_file(&run).unwrap();
+    place.good(&["study", "s.toml", "-o", "out"]);
+    assert!(results(&place.path("out")) == before);
+    // Nor is anything measured of another view.
+    fs::remove_file(&run).unwrap();
+    fs::remove_file(place.path("out/traces/ramps.arrow")).unwrap();
+    let (code, error) = place.bad(&["study", "s.toml", "-o", "out"]);
+    assert!(code == 1 && error.contains("was another one when the study was begun"), "{error}");
+    assert!(!run.exists());
+    // As where the process ended between the trace and its facts.
+    fs::remove_dir_all(place.path("out/runs")).unwrap();
+    fs::remove_file(place.path("out/scenes/ramps.json")).unwrap();
+    place.good(&["study", "s.toml", "-o", "out"]);
+    assert_eq!(facts(&place)["warnings"], told);
 }
 
 #[test]

@@ -56,6 +56,32 @@ fn strict_makes_errors_of_warnings_and_writes_nothing() {
     assert!(place.path("t.arrow").exists());
 }
 
+#[test]
+fn options_that_change_nothing_are_told_of() {
+    let place = Workplace::new();
+    // A splat of antimatter15's: place, sizes, colour and opacity, turn.
+    let mut splat: Vec<u8> =
+        [0.0_f32, 0.0, 0.0, 1.0, 1.0, 1.0].iter().flat_map(|v| v.to_le_bytes()).collect();
+    splat.extend([255, 128, 0, 200, 255, 128, 128, 128]);
+    fs::write(place.path("a.splat"), splat).unwrap();
+    fs::write(place.path("a.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    image::RgbImage::new(1, 1).save(place.path("a.png")).unwrap();
+    let told = |file: &str, more: &[&str]| {
+        let arguments = ["capture", file, "-o", "t.arrow", "--size", "16x16", "--samples", "4"];
+        let output = place.run(&[&arguments, more].concat());
+        assert!(output.status.success());
+        lines(&output.stderr).iter().filter(|l| l.starts_with("warning: ")).cloned().collect()
+    };
+    let all = ["--faces", "both", "--texture", "a.png", "--splat-rules", "gsplat"];
+    let found: Vec<String> = told("a.splat", &all);
+    assert_eq!(found.len(), 2, "{found:?}");
+    assert!(found[0].contains("a.png: splats show no texture"), "{found:?}");
+    assert!(found[1].contains("faces 'both' changes nothing"), "{found:?}");
+    let found: Vec<String> = told("a.obj", &all);
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert!(found[0].contains("splat rules 'gsplat' change nothing"), "{found:?}");
+}
+
 /// An OBJ file of several objects, each with its own reason not to be seen from the front.
 const UNSEEN: &str = "mtllib a.mtl
 v -1 -1 0\nv 1 -1 0\nv 0 1 0

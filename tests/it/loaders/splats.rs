@@ -234,7 +234,7 @@ fn all_versions_of_spz_say_the_same() {
     for version in 1..=4 {
         let scene = load("a.spz", &spz(version, version > 2)).unwrap();
         // Which way is up the format says and its writers do not heed.
-        warned(&scene, 1, &["--axes"]);
+        warned(&scene, 1, &["say as its axes"]);
         let splats = found(&scene);
         assert_eq!((splats.means.len(), splats.degree), (3, 1), "{version}");
         assert_eq!(splats.means[2], Vec3::new(1.0, 2.0, -1.0));
@@ -283,6 +283,8 @@ fn damaged_spz_is_one_error() {
     says(&zipped(b"NGSP"), "cannot be decompressed");
     let whole = spz(3, false);
     says(&whole[..whole.len() / 2], "cannot be decompressed");
+    let whole = spz(3, false);
+    says(&[&whole[..], &[0, 1]].concat(), "2 bytes after its gzip stream");
     let whole = spz(4, false);
     says(&whole[..whole.len() - 1], "needs");
     says(&[&whole[..], &[0]].concat(), "1 bytes after its last array");
@@ -310,7 +312,7 @@ fn which_way_is_up_can_be_said() {
         assert_eq!(scene.world, scene.objects[0].place);
     }
     let error = up("a.gltf", Axes::ZUp).unwrap_err().to_string();
-    assert!(error.contains("leave --axes out"), "{error}");
+    assert!(error.contains("leave the axes out"), "{error}");
     let axes = LoadOptions { axes: Some(Axes::ZUp), ..LoadOptions::default() };
     assert!(load_with("builtin:cloth", &axes).is_err());
 }
@@ -357,6 +359,56 @@ fn meshes_are_read_with_their_colours() {
 }
 
 #[test]
+fn what_of_a_mesh_is_not_read_is_told() {
+    let edited = |changes: &[(&str, &str)]| {
+        let text = changes.iter().fold(MESH.to_string(), |text, (from, to)| text.replace(from, to));
+        load("a.ply", text.as_bytes()).unwrap()
+    };
+    let plain = edited(&[]);
+    // Short names of colours, and opacities, say the same.
+    let mut short = vec![("uchar red", "uchar r"), ("uchar green", "uchar g")];
+    short.extend([("uchar blue", "uchar b"), ("uchar alpha", "uchar opacity")]);
+    let scene = edited(&short);
+    assert_eq!(super::mesh(&scene, 0).colours, super::mesh(&plain, 0).colours);
+    let lists = "uchar int vertex_indices\nproperty list uchar float texcoord";
+    let row = ("4 0 1 2 3\n", "4 0 1 2 3 2 0 1\n");
+    warned(&edited(&[("uchar int vertex_indices", lists), row]), 1, &["'texcoord' is not read"]);
+    let comment = ("element vertex", "comment TextureFile my skin.png\nelement vertex");
+    warned(&edited(&[comment]), 1, &["texture 'my skin.png' is not read"]);
+}
+
+#[test]
+fn normals_that_are_no_numbers_are_none() {
+    let text = |last: &str| {
+        let properties = "property float nx\nproperty float ny\nproperty float nz\n";
+        let header = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
+                      property float z\n";
+        let rows = format!("0 0 0 1 0 0\n1 0 0 0 1 0\n0 1 0 {last}\n3 0 1 2\n");
+        let faces = "element face 1\nproperty list uchar int vertex_index\nend_header\n";
+        [header, properties, faces, &rows].concat()
+    };
+    let normals = |last: &str| {
+        let scene = load("a.ply", text(last).as_bytes()).unwrap();
+        let mesh = super::mesh(&scene, 0);
+        mesh.triangles[0].map(|i| mesh.normals[i as usize])
+    };
+    assert_eq!(normals("0 1 0"), [Vec3::X, Vec3::Y, Vec3::Y]);
+    // That of the triangle stands in its place, as in OBJ.
+    assert_eq!(normals("nan nan nan"), [Vec3::X, Vec3::Y, Vec3::Z]);
+    assert_eq!(normals("0 inf 0"), [Vec3::X, Vec3::Y, Vec3::Z]);
+}
+
+#[test]
+fn faces_beside_splats_are_told_of() {
+    let text = String::from_utf8(trained("ascii")).unwrap().replace("NaN", "1");
+    let face = "element face 1\nproperty list uchar int vertex_index\nend_header";
+    let text = text.replace("end_header", face) + "3 0 1 0\n";
+    let scene = load("a.ply", text.as_bytes()).unwrap();
+    assert_eq!(found(&scene).means.len(), 2);
+    warned(&scene, 1, &["1 faces are not drawn beside its splats"]);
+}
+
+#[test]
 fn what_a_ply_file_does_not_hold_is_one_error() {
     let says = |bytes: &[u8], part: &str| {
         let error = load("a.ply", bytes).expect_err(part).to_string();
@@ -384,6 +436,10 @@ fn what_a_ply_file_does_not_hold_is_one_error() {
     says(&mesh("element face 1", "element edge 1"), "neither Gaussian splats nor faces");
     says(&edited("element vertex 1", "element vertex 18446744073709551615"), "bytes are left");
     says(&edited("element vertex 1", "element vertex 99999999999999999999"), "line 23");
+    says(&mesh("property float y", "property float x"), "'vertex' has two properties 'x'");
+    says(&mesh("element face 1", "element vertex 1"), "two elements 'vertex'");
+    let long = format!("comment {}\n", "long ".repeat(20_000)).repeat(12) + "element vertex 4";
+    says(&mesh("element vertex 4", &long), "header is longer than 1 MiB");
     says(&edited("comment made", "rubbish\x07"), "line 3 of its PLY header cannot be read");
     says(&edited("element chunk 1", "element chunk 0"), "bytes more");
     says(&edited("property uint packed_color\n", ""), "bytes more");

@@ -608,6 +608,21 @@ fn other_cases() -> Vec<Case> {
         let text = String::from_utf8(splats::trained("ascii")).unwrap().replace(from, to);
         file("a.ply", text.into_bytes())
     };
+    // A triangle whose corners have these normals along x, or none.
+    let with_normal = |x: &str| {
+        let names = if x.is_empty() {
+            ""
+        } else {
+            "property float nx\nproperty float ny\nproperty float nz\n"
+        };
+        let row = if x.is_empty() { String::new() } else { format!(" {x} 0 1") };
+        let text = format!(
+            "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
+             property float z\n{names}element face 1\nproperty list uchar int vertex_index\n\
+             end_header\n0 0 0{row}\n1 0 0{row}\n0 1 0{row}\n3 0 1 2\n"
+        );
+        file("a.ply", text.into_bytes())
+    };
     let raw = [&b"NGSP\x02\0\0\0\x01\0\0\0\0\x0c\0\0"[..], &[0; 19]].concat();
     let thick = |word: usize| {
         let mut bytes = tfx(3, 4, |head| head[word] = 352);
@@ -675,6 +690,58 @@ fn other_cases() -> Vec<Case> {
                 "faces' own colours",
             ),
         ),
+        ply(
+            "texture coordinates of faces",
+            Says(
+                edited("", "")
+                    .into_iter()
+                    .map(|(name, bytes)| {
+                        let list = "vertex_indices\nproperty list uchar float texcoord";
+                        let text = String::from_utf8(bytes).unwrap();
+                        let text = text.replace("vertex_indices", list);
+                        (name, text.replace("4 0 1 2 3", "4 0 1 2 3 0").into_bytes())
+                    })
+                    .collect(),
+                "'texcoord' is not read",
+            ),
+        ),
+        ply(
+            "textures that comments name",
+            Says(
+                edited("element vertex", "comment TextureFile a.png\nelement vertex"),
+                "texture 'a.png'",
+            ),
+        ),
+        ply("normals that are not finite", Like(with_normal("nan"), with_normal(""))),
+        ply(
+            "faces beside splats",
+            Says(
+                trained("NaN", "1")
+                    .into_iter()
+                    .map(|(name, bytes)| {
+                        let face =
+                            "element face 1\nproperty list uchar int vertex_index\nend_header";
+                        let text = String::from_utf8(bytes).unwrap();
+                        (name, (text.replace("end_header", face) + "3 0 1 0\n").into_bytes())
+                    })
+                    .collect(),
+                "faces are not drawn",
+            ),
+        ),
+        ply(
+            "two elements or properties of one name",
+            Says(edited("property float t", "property float s"), "two properties 's'"),
+        ),
+        ply(
+            "headers of more than 1 MiB, more than 2^28 numbers in text or beside lists",
+            Says(
+                edited(
+                    "element vertex",
+                    &format!("{}element vertex", "comment no\n".repeat(1 << 17)),
+                ),
+                "longer than 1 MiB",
+            ),
+        ),
         ply("triangle strips", Says(edited("element face", "element tristrips"), "in strips")),
         ply("point clouds", Says(edited("element face", "element edge"), "faces of a mesh")),
         splat(
@@ -683,7 +750,10 @@ fn other_cases() -> Vec<Case> {
                 assert_eq!(splats::found(scene).means.len(), 2);
             }),
         ),
-        splat("`.spz` of versions 1 to 4", Says(file("a.spz", splats::spz(3, false)), "--axes")),
+        splat(
+            "`.spz` of versions 1 to 4",
+            Says(file("a.spz", splats::spz(3, false)), "say as its axes"),
+        ),
         splat(
             "`.spz` of versions 1 to 3 that is not compressed",
             Says(file("a.spz", raw), "not compressed by gzip"),

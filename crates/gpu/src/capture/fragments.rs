@@ -32,7 +32,7 @@ pub struct RawFragment {
     pub z: f32,
     /// How it changes per pixel, to the right and downwards.
     pub slopes: [f32; 2],
-    /// Linear colour, not multiplied by alpha.
+    /// Colour in the trace's space, not multiplied by alpha.
     pub colour: [f32; 3],
     /// Opacity.
     pub alpha: f32,

@@ -19,10 +19,11 @@ pub fn markdown(results: &Results) -> String {
     }
     document.paragraph(format!(
         "{} from {}, where a seed changes anything. Errors are over the covered pixels, against \
-         the exact picture of the same samples, on linear values in units of 1/255, ± half of \
+         the exact picture of the same samples, {} in units of 1/255, ± half of \
          the 95 % interval; the mean error is picture minus exact picture, with its sign. Everything but times is the same on every machine.",
         counted(study.seeds as usize, "seed"),
-        study.first_seed
+        study.first_seed,
+        results.values()
     ));
     for scene in &study.scenes {
         document.parts.extend(study.samples.iter().map(|n| table(results, &scene.name, *n)));

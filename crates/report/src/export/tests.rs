@@ -261,5 +261,5 @@ fn studies_that_are_shown_are_some() {
     assert_eq!((study.scenes.len(), study.seeds), (2, 16));
     let small = include_str!("../../../../workflow/small.toml");
     let small = Study::parse(small, "small.toml").unwrap();
-    assert!(small.scenes.iter().all(|s| s.size == [64, 64]));
+    assert!(small.scenes.iter().all(|s| s.size == Some([64, 64])));
 }

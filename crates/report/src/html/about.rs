@@ -161,7 +161,7 @@ pub(super) fn method(content: &Content<'_>) -> Markup {
                 dt { "Error" }
                 dd {
                     "Root mean square over covered pixels and channels of picture minus exact picture of the \
-                     same samples, on linear values, in units of 1/255 of the range from black to white."
+                     same samples, " (content.results.values()) ", in units of 1/255 of the range from black to white."
                 }
                 dt { "Relative error" }
                 dd {

@@ -170,7 +170,7 @@ pub(super) fn per_scene(content: &Content<'_>) -> Markup {
         "central-scenes",
         &html! { (tabs("Cost", &panels)) (content.legend(|_| true)) },
         &html! {
-            "RMSE over covered pixels in 8-bit units on linear values, with 95 % intervals over seeds."
+            "RMSE over covered pixels in 8-bit units " (content.results.values()) ", with 95 % intervals over seeds."
         },
         &html! { (content.study_command()) (content.replay_one()) },
     )

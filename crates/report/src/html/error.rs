@@ -6,7 +6,6 @@ use crate::chart::{Bar, Kind, Row, Rows, Segment, swatch};
 use crate::html::choice::share_cell;
 use crate::html::parts::{Cell, Content, figure, nothing, table};
 use crate::html::words::{estimated, figures, fixed};
-use screendoor_study::metrics::Estimate;
 use screendoor_study::study::analysis::baseline;
 use screendoor_study::study::record::Record;
 
@@ -22,8 +21,8 @@ pub(super) fn section(content: &Content<'_>) -> Markup {
         }, &again()))
         h3 { "Scene by scene" }
         (figure("rmse", &content.by_scene(|scene| rmse(content, scene)), &html! {
-            "RMSE over covered pixels against the exact picture of the same samples, in 8-bit units \
-             on linear values, with 95 % intervals over seeds."
+            "RMSE over covered pixels against the exact picture of the same samples, in 8-bit units "
+            (content.results.values()) ", with 95 % intervals over seeds."
         }, &again()))
         h3 { "Bias and variance at " (content.count) " samples" }
         (figure("bias", &content.by_scene(|scene| bias(content, scene)), &html! {
@@ -72,25 +71,13 @@ fn rmse(content: &Content<'_>, scene: &str) -> Markup {
     table(&header, &content.designs().iter().map(row).collect::<Vec<_>>())
 }
 
-/// Variance and squared bias; all of the error is bias where seeds change nothing.
-fn parts(record: &Record) -> Option<(f64, Estimate)> {
-    let e = &record.covered;
-    match (e.variance, e.bias_squared) {
-        (Some(variance), Some(bias)) => Some((variance, bias)),
-        _ => (!record.promises.seeded).then(|| {
-            let value = e.rmse.value * e.rmse.value;
-            (0.0, Estimate::exactly(value))
-        }),
-    }
-}
-
 fn bias(content: &Content<'_>, scene: &str) -> Markup {
     let rows = content
         .designs()
         .iter()
         .map(|series| {
             let record = content.at_count(scene, series);
-            let split = record.and_then(parts);
+            let split = record.and_then(Record::parts);
             let segment = |value: f64, measure: &'static str, says: String| Segment {
                 value,
                 measure: measure.to_string(),
@@ -162,7 +149,7 @@ fn all_errors(content: &Content<'_>, scene: &str) -> Markup {
             known(r.fine),
             Cell::Number(r.covered.max, fixed(r.covered.max, 1)),
             optional(r.covered.variance),
-            Cell::estimate(parts(r).map(|(_, bias)| bias), 3, "one seed"),
+            Cell::estimate(r.parts().map(|(_, bias)| bias), 3, "one seed"),
             Cell::Number(f64::from(r.seeds), r.seeds.to_string()),
         ]);
         cells

@@ -79,7 +79,7 @@ fn flicker_section(content: &Content<'_>) -> Markup {
         "flicker",
         &content.by_scene(|scene| flicker(content, scene)),
         &html! {
-            "Standard deviation over seeds of a covered pixel's linear value, in 8-bit units: what changes \
+            "Standard deviation over seeds of a covered pixel, in 8-bit units " (content.results.values()) ": what changes \
              from frame to frame in a still scene where every frame has a seed of its own. Half of the \
              pixels, and 95 % of them, have no more."
         },

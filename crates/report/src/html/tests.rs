@@ -9,6 +9,7 @@ use screendoor_study::study::analysis::{Cost, RunName, reference_count, relative
 use screendoor_study::study::record::Record;
 use screendoor_study::study::results::Results;
 use screendoor_trace::param::Options;
+use screendoor_trace::picture::Space;
 
 fn extras() -> Extras {
     Extras { when: Some("2026-01-02".into()), ..Extras::default() }
@@ -230,6 +231,17 @@ fn a_planted_defect_is_found() {
     let mut more = results.clone();
     more.records[0].id.push_str("-other");
     assert!(check(&html, &more).is_err());
+}
+
+#[test]
+fn words_on_errors_follow_the_traces_colours() {
+    let mut results = plausible(2, 3, &[4, 8]);
+    assert!(page(&results, &extras()).contains("on linear values"));
+    results.scenes.iter_mut().for_each(|s| s.space = Space::Encoded);
+    let html = page(&results, &extras());
+    assert!(html.contains("on encoded values") && !html.contains("on linear values"));
+    let text = crate::export::markdown(&results);
+    assert!(text.contains("on encoded values") && !text.contains("linear values"));
 }
 
 #[test]

@@ -5,7 +5,6 @@ use crate::results::beyond::{means, ratios, scenes, share, two};
 use crate::results::ratios::OnScenes;
 use screendoor_study::study::analysis::{ROUNDING, RunName, ratio, ratio_on};
 use screendoor_study::study::publications::beyond::Beyond;
-use screendoor_study::study::record::Record;
 use screendoor_study::study::results::Results;
 
 /// Samples at which is told in short.
@@ -60,7 +59,8 @@ pub(super) fn in_short(b: &Beyond) -> Vec<Text> {
     }
     let biases = scenes(results).filter_map(|scene| {
         let record = results.record(scene, POWERED, SHOWN)?;
-        Some(format!("{:.1} (`{scene}`)", parts(record)[1].sqrt()))
+        let (_, bias) = record.parts()?;
+        Some(format!("{:.1} (`{scene}`)", bias.value.max(0.0).sqrt()))
     });
     let biases: Vec<String> = biases.collect();
     let bias = match biases.is_empty() {
@@ -101,16 +101,6 @@ fn layers(results: &Results) -> Section {
     part
 }
 
-/// Variance and squared bias over the covered pixels; all of the error is bias where seeds
-/// change nothing.
-fn parts(record: &Record) -> [f64; 2] {
-    let e = &record.covered;
-    match (e.variance, e.bias_squared) {
-        (Some(variance), Some(bias)) => [variance, bias.value.max(0.0)],
-        _ => [0.0, e.rmse.value * e.rmse.value],
-    }
-}
-
 /// One sample a frame, accumulated, beside as many samples in one frame.
 fn accumulated(results: &Results) -> Section {
     let mut part = Section::new(format!("{FRAMES} frames of one sample, and {FRAMES} samples"));
@@ -123,8 +113,8 @@ fn accumulated(results: &Results) -> Section {
         let cells = scenes(results).map(|scene| {
             let records = [1, FRAMES].map(|samples| results.record(scene, series, samples));
             let [Some(one), Some(many)] = records else { return "—".to_string() };
-            let [variance, bias] = parts(one);
-            let mean = (variance / f64::from(FRAMES) + bias).sqrt();
+            let Some((variance, bias)) = one.parts() else { return "—".to_string() };
+            let mean = (variance / f64::from(FRAMES) + bias.value.max(0.0)).sqrt();
             let [one, many] = [one, many].map(|r| r.covered.rmse.value);
             format!("{one:.1} → {mean:.1}; {many:.1}")
         });

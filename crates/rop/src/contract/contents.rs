@@ -26,6 +26,6 @@ impl Contents {
 pub struct SampleContents {
     /// Its depth.
     pub depth: Unorm32,
-    /// Its linear colour.
+    /// Its colour, as the trace has them.
     pub colour: [f32; 3],
 }

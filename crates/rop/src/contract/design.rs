@@ -53,7 +53,7 @@ pub trait Design: Send + Sync {
     ) {
     }
 
-    /// The pixel's linear colour over the background.
+    /// The pixel's colour over the background, in the trace's space as its fragments are.
     fn resolve(&self, site: Site, pixel: &Self::Pixel) -> [f64; 3];
 
     /// The pixel's state as `explain` shows it.

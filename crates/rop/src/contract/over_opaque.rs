@@ -97,7 +97,7 @@ pub trait Transparent<const N: usize>: Send + Sync {
     ) {
     }
 
-    /// The pixel's linear colour over the opaque picture's samples `behind`.
+    /// The pixel's colour over the opaque picture's samples `behind`.
     fn resolve(&self, site: Site, pixel: &Self::Pixel, behind: &[[f32; 3]; N]) -> [f64; 3];
 
     /// As [`Design::contents`].

@@ -39,7 +39,7 @@ pub struct Explanation {
     pub steps: Vec<Step>,
     /// What was done at the end of each pass, when no fragment was left.
     pub ended: Vec<Record>,
-    /// The pixel's linear colour.
+    /// The pixel's colour, in the trace's space.
     pub colour: [f64; 3],
 }
 

@@ -1,12 +1,14 @@
 //! From the scene's space to the frame.
 
+mod choice;
 mod file;
 mod pose;
 
 use glam::{DMat3, DMat4, DVec3, DVec4};
 
-pub use self::file::Poses;
+pub use self::choice::{CameraChoice, Chosen};
 pub use self::pose::Pose;
+use crate::capture::splat::SplatRules;
 use crate::scene::Scene;
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::trace::{Projection, View};
@@ -24,10 +26,6 @@ pub struct CameraOptions {
     pub field_of_view: Option<f64>,
     /// Where it stands, in place of all that.
     pub pose: Option<Pose>,
-    /// Splats are drawn whose means lie further away than this, in the scene's units.
-    pub splats_from: f64,
-    /// Whether depth varies over a splat, so that all of it is told apart, not its mean alone.
-    pub splats_deep: bool,
 }
 
 /// Degrees from top to bottom where nothing else is asked for.
@@ -70,15 +68,21 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// The camera that `options` and the scene's view describe, over a frame of
-    /// `width` × `height` pixels.
+    /// The camera that `options` and the scene's view describe, over a frame of `size` pixels.
+    /// Splats are drawn by `rules`, which say how near they may be.
     ///
     /// # Errors
     /// [`Error::Config`] for options out of range.
-    pub fn frame(scene: &Scene, options: &CameraOptions, width: u32, height: u32) -> Result<Self> {
+    pub fn frame(
+        scene: &Scene,
+        options: &CameraOptions,
+        rules: &SplatRules,
+        size: [u32; 2],
+    ) -> Result<Self> {
         if let Some(pose) = &options.pose {
-            return pose.camera(scene, width, height, options);
+            return pose.camera(scene, rules, size);
         }
+        let size = size.map(f64::from);
         let view = scene.view;
         let [yaw, pitch] = options.angle.unwrap_or([view.yaw, view.pitch]);
         if !(yaw.is_finite() && (-90.0..=90.0).contains(&pitch)) {
@@ -131,7 +135,7 @@ impl Camera {
             DVec4::new(-right.dot(centre), -up.dot(centre), -back.dot(centre), 1.0),
         );
 
-        let aspect = f64::from(width) / f64::from(height);
+        let aspect = size[0] / size[1];
         let room = 1.0 - 2.0 * MARGIN;
         let (mut nearest, mut furthest) = (f64::NEG_INFINITY, f64::INFINITY);
         let flat = fov == 0.0;
@@ -195,7 +199,7 @@ impl Camera {
             };
             let solid = (distance - nearest, distance - furthest);
             let eye = centre + back * distance;
-            let [near, far] = range(scene, solid, NEAREST, (eye, -back, options))?;
+            let [near, far] = range(scene, solid, NEAREST, (eye, -back, rules))?;
             let projection = DMat4::from_cols(
                 DVec4::new(1.0 / tangent_x, 0.0, 0.0, 0.0),
                 DVec4::new(0.0, 1.0 / tangent_y, 0.0, 0.0),
@@ -213,7 +217,6 @@ impl Camera {
             let focal = [tangent_x, tangent_y].map(|tangent| 0.5 / tangent);
             (projection * retreat * to_view, Some(eye), seen, focal)
         };
-        let size = [f64::from(width), f64::from(height)];
         let range = match eye {
             Some(_) => [seen.near, seen.far],
             None => [-nearest, -furthest],
@@ -289,15 +292,16 @@ fn range(
     scene: &Scene,
     solid: (f64, f64),
     least: f64,
-    (eye, forward, options): (DVec3, DVec3, &CameraOptions),
+    (eye, forward, rules): (DVec3, DVec3, &SplatRules),
 ) -> Result<[f64; 2]> {
-    let from = options.splats_from;
+    let from = rules.near();
     let (mut near, mut far) = (f64::INFINITY, f64::NEG_INFINITY);
     if solid.1 > 0.0 {
         (near, far) = (solid.0.max(solid.1 * least), solid.1);
     }
     for (mean, around) in scene.splat_points() {
-        let around = if options.splats_deep { around } else { 0.0 };
+        // Where depth varies over a splat, all of it is told apart, not its mean alone.
+        let around = if rules.is_deep() { around } else { 0.0 };
         let distance = forward.dot(mean - eye);
         if distance > from {
             near = near.min((distance - around).max(from) * 0.999);
@@ -307,8 +311,8 @@ fn range(
     let known = far.is_finite() && near > 0.0 && near < far;
     if !known {
         let hint = match scene.has_splats() {
-            true => "move it away with --distance, or set near of --splat-rules lower",
-            false => "move it away with --distance",
+            true => "move the camera away, or set near of the splat rules lower",
+            false => "move the camera away",
         };
         let nearer = if scene.has_splats() { " or nearer than splats are drawn" } else { "" };
         let what = format_args!("the whole scene lies behind the camera{nearer}");
@@ -328,13 +332,14 @@ fn parallel([half_width, half_height]: [f64; 2], near: f64, far: f64) -> DMat4 {
     )
 }
 
+/// What cameras are tested on.
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scene::{Mesh, Shape};
+mod testing {
+    use crate::scene::{Mesh, Scene, Shape};
     use glam::Vec3;
 
-    fn cube() -> Scene {
+    /// The corners of a cube from 0 to 1, with a triangle at each of them.
+    pub(super) fn cube() -> Scene {
         let corner = |i: u32| Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32);
         let mesh = Mesh {
             positions: (0..8).map(corner).collect(),
@@ -344,6 +349,18 @@ mod tests {
         let mut scene = Scene::default();
         scene.add("cube", Shape::Mesh(mesh));
         scene
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::testing::cube;
+    use super::*;
+    use crate::scene::{Mesh, Shape};
+    use glam::Vec3;
+
+    fn frame(scene: &Scene, options: &CameraOptions, size: [u32; 2]) -> Result<Camera> {
+        Camera::frame(scene, options, &SplatRules::default(), size)
     }
 
     #[test]
@@ -357,7 +374,7 @@ mod tests {
                         ..CameraOptions::default()
                     };
                     let scene = cube();
-                    let camera = Camera::frame(&scene, &options, width, height).unwrap();
+                    let camera = frame(&scene, &options, [width, height]).unwrap();
                     let mut reach = 0.0_f64;
                     for (point, _) in scene.bounding_points() {
                         let clip = camera.to_clip * point.extend(1.0);
@@ -382,7 +399,7 @@ mod tests {
                     ..CameraOptions::default()
                 };
                 let scene = cube();
-                let camera = Camera::frame(&scene, &options, 320, 100).unwrap();
+                let camera = frame(&scene, &options, [320, 100]).unwrap();
                 let view = camera.view().unwrap();
                 let to_view = DMat4::from_cols_array(&view.world_to_view);
                 let to_clip = DMat4::from_cols_array(&view.view_to_clip) * to_view;
@@ -409,7 +426,7 @@ mod tests {
             ..Mesh::default()
         };
         scene.add("far", Shape::Mesh(far));
-        let camera = Camera::frame(&scene, &CameraOptions::default(), 10, 10).unwrap();
+        let camera = frame(&scene, &CameraOptions::default(), [10, 10]).unwrap();
         assert!(camera.view().is_none_or(|view| view.check().is_ok()));
     }
 
@@ -418,7 +435,7 @@ mod tests {
         let at = |yaw, pitch| {
             let angle = Some([yaw, pitch]);
             let options = CameraOptions { angle, ..CameraOptions::default() };
-            Camera::frame(&cube(), &options, 10, 10).unwrap().back
+            frame(&cube(), &options, [10, 10]).unwrap().back
         };
         assert!((at(90.0, 0.0) - DVec3::X).length() < 1e-12);
         assert!((at(0.0, 90.0) - DVec3::Y).length() < 1e-12);

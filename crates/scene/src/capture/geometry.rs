@@ -270,7 +270,8 @@ mod tests {
     fn ellipsoids_are_seen_as_their_outlines() {
         // From the front, along parallel lines.
         let scene = crate::scene::load("builtin:ramps").unwrap();
-        let camera = Camera::frame(&scene, &Default::default(), 8, 8).unwrap();
+        let camera =
+            Camera::frame(&scene, &Default::default(), &Default::default(), [8, 8]).unwrap();
         let seen = |axes: DMat3, towards| outline(&axes, &camera, towards);
         let close = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).abs() + (a[1] - b[1]).abs() < 1e-12;
         let ball = DMat3::from_diagonal(DVec3::splat(2.0));

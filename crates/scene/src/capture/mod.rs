@@ -9,6 +9,7 @@
 mod camera;
 mod covered;
 mod geometry;
+mod job;
 mod order;
 mod pattern;
 mod raster;
@@ -21,7 +22,7 @@ use std::io::Write;
 
 use rayon::prelude::*;
 
-pub use camera::{Camera, CameraOptions, Pose, Poses};
+pub use camera::{Camera, CameraChoice, CameraOptions, Chosen, Pose};
 pub use covered::{Drawing, SetUp};
 pub use order::Order;
 pub use pattern::{PatternKind, pattern};
@@ -29,13 +30,14 @@ pub use splat::{OnFrame as SplatOnFrame, PARAMS as SPLAT_PARAMS, RULE_SETS, Rule
 pub use unseen::Unseen;
 
 use crate::capture::geometry::{Geometry, Primitive, Triangle};
-use crate::capture::raster::Raster;
+use crate::capture::job::{Drawn, Tools, cut_into_jobs, wave_length};
 use crate::capture::setup::{STEPS, ScreenTriangle, set_up};
 use crate::capture::shade::Shader;
-use crate::capture::splat::{Nothing, Painter, Placed};
+use crate::capture::splat::Painter;
 use crate::capture::unseen::Recorded;
 use crate::scene::Scene;
 use screendoor_trace::error::{Error, Result};
+use screendoor_trace::param::Options;
 use screendoor_trace::picture::Space;
 use screendoor_trace::trace::{
     ColourFormat, ColumnId, Fragment, Header, Scalar, Trace, TraceWriter, WriteOptions,
@@ -101,6 +103,24 @@ impl Default for CaptureOptions {
     }
 }
 
+impl CaptureOptions {
+    /// What of the options changes nothing, since the scene has nothing that it is for.
+    pub fn unused(&self, scene: &Scene) -> Vec<String> {
+        let mut told = Vec::new();
+        if self.faces != Faces::Material && scene.is_all_splats() {
+            told.push(format!(
+                "splats have no sides: faces '{}' changes nothing",
+                self.faces.name()
+            ));
+        }
+        if self.splats != SplatRules::default() && !scene.has_splats() {
+            let rules = self.splats.spec();
+            told.push(format!("the scene has no splats: splat rules '{rules}' change nothing"));
+        }
+        told
+    }
+}
+
 /// A scene about to be captured.
 pub struct Capture<'a> {
     scene: &'a Scene,
@@ -112,11 +132,6 @@ pub struct Capture<'a> {
 
 /// Triangles and splats set up at a time.
 const CHUNK: usize = 1 << 14;
-/// Pixels of bounding boxes that one job rasterises.
-const JOB_PIXELS: i64 = 1 << 13;
-/// Pixels of bounding boxes that are in flight at a time.
-const WAVE_PIXELS: i64 = 1 << 19;
-
 impl<'a> Capture<'a> {
     /// Places the camera and makes the trace's header.
     ///
@@ -124,16 +139,11 @@ impl<'a> Capture<'a> {
     /// [`Error::Config`] for options out of range.
     pub fn new(scene: &'a Scene, options: &'a CaptureOptions) -> Result<Self> {
         if options.alpha.is_some_and(|a| !(0.0..=1.0).contains(&a)) {
-            return Err(Error::config("an alpha lies in [0, 1]", "give --alpha such a number"));
+            return Err(Error::config("an alpha lies in [0, 1]", "give such a number"));
         }
         let space = space(scene, options)?;
-        let rules = &options.splats;
-        let seen = CameraOptions {
-            splats_from: rules.near(),
-            splats_deep: rules.is_deep(),
-            ..options.camera.clone()
-        };
-        let camera = Camera::frame(scene, &seen, options.width, options.height)?;
+        let size = [options.width, options.height];
+        let camera = Camera::frame(scene, &options.camera, &options.splats, size)?;
         let background = options.background.unwrap_or(scene.view.background);
         let mut header = Header {
             width: options.width,
@@ -320,166 +330,9 @@ fn space(scene: &Scene, options: &CaptureOptions) -> Result<Space> {
             &scene.source,
             "it has splats, which are trained to be blended as encoded, and shapes that are \
              blended in linear light",
-            "say with --space which of both all of it is blended in",
+            "say as its space which of both all of it is blended in",
         )),
         None if own(Space::Encoded) => Ok(Space::Encoded),
         None => Ok(Space::Linear),
-    }
-}
-
-/// What a capture draws with.
-struct Tools<'a> {
-    shader: Shader<'a>,
-    painter: Painter<'a>,
-    /// Each object's place, for its splats.
-    placed: Vec<Placed>,
-    rules: &'a SplatRules,
-    /// The samples' places from the pixel's centre, in sub-pixel steps and in pixels.
-    steps: Vec<[i64; 2]>,
-    pixels: Vec<[f64; 2]>,
-    /// The frame's, in pixels.
-    size: [u32; 2],
-}
-
-impl Tools<'_> {
-    fn project(&self, splat: &geometry::Splat<'_>) -> std::result::Result<SplatOnFrame, Nothing> {
-        self.painter.project(splat.splats, splat.index, &self.placed[splat.object as usize])
-    }
-
-    fn raster<'p>(&'p self, piece: &'p ScreenTriangle) -> Raster<'p> {
-        Raster::new(piece, &self.steps, self.size)
-    }
-}
-
-/// A primitive and what is left of it on the frame.
-enum Drawn {
-    Triangle {
-        triangle: Triangle,
-        /// What clipping left of it.
-        pieces: Vec<ScreenTriangle>,
-    },
-    Splat {
-        on_frame: std::result::Result<SplatOnFrame, Nothing>,
-        object: u32,
-        primitive: u32,
-    },
-}
-
-/// The rows that something may touch, empty where they cross, and the pixels of each.
-struct Extent {
-    rows: (i64, i64),
-    columns: i64,
-}
-
-impl Drawn {
-    /// The extent of each piece.
-    fn extents(&self, tools: &Tools<'_>) -> Vec<Extent> {
-        match self {
-            Drawn::Triangle { pieces, .. } => {
-                let extent = |piece| {
-                    let raster = tools.raster(piece);
-                    Extent { rows: raster.rows(), columns: raster.columns() }
-                };
-                pieces.iter().map(extent).collect()
-            }
-            Drawn::Splat { on_frame, .. } => {
-                let extent = |s: &SplatOnFrame| Extent { rows: s.rows(), columns: s.columns() };
-                on_frame.iter().map(extent).collect()
-            }
-        }
-    }
-
-    /// Its fragments in some rows of a piece.
-    fn fragments(&self, part: &Part, tools: &Tools<'_>, fragments: &mut Vec<Fragment>) {
-        match self {
-            Drawn::Triangle { triangle, pieces } => {
-                let raster = tools.raster(&pieces[part.piece]);
-                for y in part.rows.0..=part.rows.1 {
-                    raster.row(y, |hit| {
-                        let weights = raster.weights(hit.shade_at);
-                        let shaded = tools.shader.shade(triangle, &weights);
-                        let Some((colour, alpha)) = shaded else { return };
-                        fragments.push(Fragment {
-                            x: hit.x,
-                            y: hit.y,
-                            coverage: hit.coverage,
-                            depth: hit.depth,
-                            colour,
-                            alpha,
-                            primitive: triangle.primitive,
-                            object: triangle.object,
-                            ..Fragment::default()
-                        });
-                    });
-                }
-            }
-            Drawn::Splat { on_frame, object, primitive } => {
-                let Ok(splat) = on_frame else { return };
-                let (object, primitive) = (*object, *primitive);
-                let of = Fragment { object, primitive, ..Fragment::default() };
-                for y in part.rows.0..=part.rows.1 {
-                    let push = |fragment| fragments.push(fragment);
-                    splat.row(y, tools.rules, &tools.pixels, of, push);
-                }
-            }
-        }
-    }
-}
-
-/// A part of the drawing that one thread does: some rows of one piece after the
-/// other.
-#[derive(Default)]
-struct Job {
-    parts: Vec<Part>,
-    pixels: i64,
-}
-
-/// Rows of a piece of a primitive, by their places in the chunk.
-struct Part {
-    drawn: usize,
-    piece: usize,
-    rows: (i64, i64),
-}
-
-/// Cuts the drawing of a chunk into jobs of about equal size, in drawing order.
-/// The cuts depend on the primitives alone, not on the threads.
-fn cut_into_jobs(drawn: &[Drawn], tools: &Tools<'_>) -> Vec<Job> {
-    let mut jobs = vec![Job::default()];
-    for (i, d) in drawn.iter().enumerate() {
-        for (k, extent) in d.extents(tools).into_iter().enumerate() {
-            let (mut row, last) = extent.rows;
-            let columns = extent.columns;
-            while row <= last {
-                let mut job = jobs.last_mut().expect("never empty");
-                if job.pixels >= JOB_PIXELS {
-                    jobs.push(Job::default());
-                    job = jobs.last_mut().expect("just pushed");
-                }
-                let room = ((JOB_PIXELS - job.pixels) / columns).max(1);
-                let end = (row + room - 1).min(last);
-                job.parts.push(Part { drawn: i, piece: k, rows: (row, end) });
-                job.pixels += (end - row + 1) * columns;
-                row = end + 1;
-            }
-        }
-    }
-    jobs
-}
-
-/// How many of `jobs` make up a wave.
-fn wave_length(jobs: &[Job]) -> usize {
-    let mut pixels = 0;
-    let full = jobs.iter().position(|job| {
-        pixels += job.pixels;
-        pixels >= WAVE_PIXELS
-    });
-    full.map_or(jobs.len(), |last| last + 1)
-}
-
-impl Job {
-    fn run(&self, drawn: &[Drawn], tools: &Tools<'_>) -> Vec<Fragment> {
-        let mut fragments = Vec::new();
-        self.parts.iter().for_each(|part| drawn[part.drawn].fragments(part, tools, &mut fragments));
-        fragments
     }
 }

@@ -7,11 +7,12 @@ use glam::DVec3;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::capture::Capture;
 use crate::capture::geometry::{Geometry, Primitive, Splat, Triangle};
+use crate::capture::job::Tools;
 use crate::capture::setup::set_up;
 use crate::capture::shade::LEAST_ALPHA;
 use crate::capture::splat::Nothing;
-use crate::capture::{Capture, Tools};
 use crate::scene::{AlphaMode, Material, Shape};
 
 /// An object of which no fragment was recorded.

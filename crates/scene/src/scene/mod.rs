@@ -11,6 +11,7 @@ mod check;
 mod far;
 pub(crate) mod file;
 mod folder;
+mod format;
 mod gltf_file;
 mod hair_file;
 mod image_file;
@@ -30,7 +31,8 @@ mod texture;
 mod tfx_file;
 mod vdb_file;
 
-pub use source::{ENDINGS, check, meant_builtin, path_of, seen_from};
+pub use format::{endings, is_scene};
+pub use source::{check, meant_builtin, path_of, seen_from};
 
 use std::path::{Path, PathBuf};
 
@@ -44,7 +46,8 @@ pub use splats::Splats;
 pub use texture::Texture;
 
 use crate::scene::folder::Folder;
-use crate::scene::source::{BUILTIN, ending, no_builtin, no_scene};
+use crate::scene::format::{Up, format_of};
+use crate::scene::source::{BUILTIN, no_builtin, no_scene};
 use screendoor_trace::error::{Error, Result};
 
 /// The most texels of all textures of a scene that were read from files: 11 bytes
@@ -145,6 +148,11 @@ impl Scene {
         self.shapes.iter().any(|shape| matches!(shape, Shape::Splats(_)))
     }
 
+    /// Whether it has nothing else.
+    pub(crate) fn is_all_splats(&self) -> bool {
+        self.shapes.iter().all(|shape| matches!(shape, Shape::Splats(_)))
+    }
+
     /// All points that bound the scene, each with a radius around it.
     pub fn bounding_points(&self) -> impl Iterator<Item = (DVec3, f64)> + '_ {
         self.placed_points(Shape::bounding_points)
@@ -220,6 +228,10 @@ impl Scene {
     pub fn apply_texture(&mut self, path: &Path) -> Result<()> {
         let texture = Texture::read(path)?;
         self.files.push(path.to_path_buf());
+        if self.is_all_splats() {
+            let what = "splats show no texture: it changes nothing";
+            self.warnings.push(format!("{}: {what}", path.display()));
+        }
         let has_alpha = texture.has_alpha();
         let texture = self.add_texture(texture)?;
         for material in self.materials.iter_mut().filter(|m| m.base_texture.is_none()) {
@@ -280,10 +292,6 @@ pub struct LoadOptions {
     pub line_width: Option<f64>,
 }
 
-/// What is told of SPZ files: of all formats the one whose files do not keep to its text.
-const GUESSED: &str = "y is taken to point up, as the format has it, and many writers leave it \
-                       down: --axes y-down or y-up says which";
-
 /// Loads the scene that `source` names, as [`load_with`] does without options.
 ///
 /// # Errors
@@ -301,35 +309,25 @@ pub fn load(source: &str) -> Result<Scene> {
 /// [`Error::Io`] where the file cannot be read, [`Error::Invalid`] where it is damaged or
 /// holds nothing to draw.
 pub fn load_with(source: &str, options: &LoadOptions) -> Result<Scene> {
-    let kind = path_of(source).map(ending);
-    if options.grid.is_some() && kind.as_deref() != Some("vdb") {
+    let format = path_of(source).and_then(format_of);
+    if options.grid.is_some() && format.is_none_or(|format| format.ending != "vdb") {
         let what = format_args!("'{source}' has no grids to choose from");
         return Err(Error::config(what, "leave --grid out, or give a .vdb file"));
     }
-    if options.axes.is_some() && !kind.as_deref().is_some_and(source::may_say_up) {
+    if options.axes.is_some() && format.is_none_or(|format| format.up == Up::Said) {
         let what = format_args!("'{source}' says itself which way is up");
-        return Err(Error::config(what, "leave --axes out"));
+        return Err(Error::config(what, "leave the axes out"));
     }
     let mut scene = match source.strip_prefix(BUILTIN) {
         Some(spec) => builtin::build(spec).map_err(|e| no_builtin(source, e))?,
         None => {
             let path = Path::new(source);
             let folder = Folder::of(path, options.allow_outside);
-            let mut scene = match ending(path).as_str() {
-                "obj" => obj_file::load(path, &folder)?,
-                "gltf" | "glb" => gltf_file::load(path, &folder)?,
-                "vdb" => vdb_file::load(path, options.grid.as_deref())?,
-                "ply" => ply_file::load(path)?,
-                "hair" => hair_file::load(path)?,
-                "stl" => stl_file::load(path)?,
-                "splat" => splat_file::load_packed(path)?,
-                "spz" => splat_file::load_spz(path)?,
-                "tfx" => tfx_file::load(path)?,
-                _ => return Err(no_scene(source)),
-            };
+            let Some(format) = format else { return Err(no_scene(source)) };
+            let mut scene = (format.load)(path, &folder, options)?;
             folder.tell(&mut scene);
-            if kind.as_deref() == Some("spz") && options.axes.is_none() {
-                scene.warnings.push(format!("{source}: {GUESSED}"));
+            if let (Up::Guessed(what), None) = (format.up, options.axes) {
+                scene.warnings.push(format!("{source}: {what}"));
             }
             scene.stand_up(options.axes.unwrap_or(scene.axes));
             scene

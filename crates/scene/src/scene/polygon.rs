@@ -21,6 +21,9 @@ use screendoor_trace::random::Stream;
 const MAX_CORNERS: usize = 1 << 16;
 /// Crossings of edges times corners, of all polygons of a scene: what finding the edges takes.
 const MAX_WORK: f64 = (1_u64 << 26) as f64;
+/// So many edges that the sweep over a polygon keeps beside a corner take as long: a polygon of
+/// [`MAX_CORNERS`] with all of its edges side by side is cut, a second one of them is not.
+const KEPT_EDGES: f64 = 64.0;
 /// Pairs of edges for each corner that are looked at to estimate how many cross.
 const PAIRS: usize = 64;
 /// Steps of the lattice on which polygons are cut, along the longer side of their box.
@@ -43,7 +46,7 @@ pub(super) struct TooComplex;
 
 /// Cuts the polygons of a scene.
 pub(super) struct Cutter {
-    /// How much more crossings may take.
+    /// How much more crossings and sweeps may take.
     left: f64,
 }
 
@@ -59,7 +62,8 @@ impl Cutter {
     ///
     /// # Errors
     /// [`TooComplex`] where it has more than 65536 corners, or it and the polygons before it too
-    /// many crossings, and is not covered by a fan from its first corner.
+    /// many crossings or too many edges side by side, and is not covered by a fan from its first
+    /// corner.
     pub(super) fn triangulate(&mut self, points: &[DVec3]) -> Result<Vec<[Corner; 3]>, TooComplex> {
         let fan = || (1..points.len().max(2) - 1).map(|i| [0, i, i + 1].map(Corner::Own)).collect();
         if points.len() <= 3 {
@@ -72,7 +76,7 @@ impl Cutter {
         if flat.len() > MAX_CORNERS {
             return Err(TooComplex);
         }
-        self.left -= crossings(&flat) * (flat.len() + PAIRS) as f64;
+        self.left -= crossings(&flat) * (flat.len() + PAIRS) as f64 + swept(&flat) / KEPT_EDGES;
         if self.left < 0.0 { Err(TooComplex) } else { Ok(cut(&flat)) }
     }
 }
@@ -150,6 +154,16 @@ fn crossings(flat: &[DVec2]) -> f64 {
     let mut any = || random.below(count as u32) as usize;
     let found = (0..PAIRS * count).filter(|_| cross(any(), any())).count();
     found as f64 / (PAIRS * count) as f64 * pairs as f64
+}
+
+/// How many edges a sweep along x keeps, at all corners together: for each edge, the corners
+/// between its ends.
+fn swept(flat: &[DVec2]) -> f64 {
+    let mut all: Vec<f64> = flat.iter().map(|p| p.x).collect();
+    all.sort_unstable_by(f64::total_cmp);
+    let before = |x: f64| all.partition_point(|other| *other < x);
+    let edges = (0..flat.len()).map(|i| [before(flat[i].x), before(flat[(i + 1) % flat.len()].x)]);
+    edges.map(|[a, b]| a.abs_diff(b) as f64).sum()
 }
 
 /// Cuts any polygon, by the even-odd rule.
@@ -380,6 +394,14 @@ mod tests {
         let some = polygon(&wild[..200]);
         let done = (0..1000).take_while(|_| cutter.triangulate(&some).is_ok()).count();
         assert!((1..1000).contains(&done), "{done}");
+        // Nor do many whose edges, though they do not cross, all lie side by side.
+        let teeth = |i: u32| [f64::from(i % 2) * 1e4, f64::from(i)];
+        let mut long: Vec<[f64; 2]> = (0..20_000).map(teeth).collect();
+        long.extend([[3e4, 2e4], [3e4, -1.0]]);
+        let long = polygon(&long);
+        let mut cutter = Cutter::default();
+        let done = (0..20).take_while(|_| cutter.triangulate(&long).is_ok()).count();
+        assert!((5..20).contains(&done), "{done}");
         // As many corners that do not cross are cut.
         let comb: Vec<[f64; 2]> = (0..20_000_u32)
             .map(|i| {

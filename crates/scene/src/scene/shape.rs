@@ -102,6 +102,39 @@ pub struct Mesh {
     pub material: usize,
 }
 
+impl Mesh {
+    /// Gives corners whose normal is NaN that of their triangle, on vertices of their own. A
+    /// mesh of no other normals has none.
+    pub(super) fn fill_normals(&mut self) {
+        if self.normals.iter().all(|n| n.is_nan()) {
+            self.normals.clear();
+            return;
+        }
+        for t in 0..self.triangles.len() {
+            let corners = self.triangles[t].map(|i| i as usize);
+            let [a, b, c] = corners.map(|i| self.positions[i]);
+            let flat = (b - a).cross(c - a).try_normalize().unwrap_or(Vec3::Z);
+            for (k, i) in corners.into_iter().enumerate() {
+                if self.normals[i].is_nan() {
+                    self.triangles[t][k] = self.positions.len() as u32;
+                    self.positions.push(self.positions[i]);
+                    self.normals.push(flat);
+                    if let Some(uv) = self.uvs.get(i).copied() {
+                        self.uvs.push(uv);
+                    }
+                    if let Some(colour) = self.colours.get(i).copied() {
+                        self.colours.push(colour);
+                    }
+                }
+            }
+        }
+        // What is left without a normal is a vertex of no triangle.
+        for normal in self.normals.iter_mut().filter(|n| n.is_nan()) {
+            *normal = Vec3::Z;
+        }
+    }
+}
+
 /// Curves drawn as ribbons that face the camera.
 #[derive(Clone, Debug, Default)]
 pub struct Strands {

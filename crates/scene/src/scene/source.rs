@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use crate::scene::builtin;
+use crate::scene::format::{endings, is_scene};
 use screendoor_trace::error::{Error, Result, nearest};
 
 /// How a built-in scene's name begins.
@@ -23,16 +24,7 @@ pub fn seen_from(source: &str, base: &Path) -> String {
     }
 }
 
-/// The endings of the files that scenes come as.
-pub const ENDINGS: [&str; 10] =
-    ["obj", "gltf", "glb", "ply", "stl", "vdb", "tfx", "hair", "splat", "spz"];
-
-/// Whether it may be asked which way is up in files of that ending: in glTF it is y.
-pub(super) fn may_say_up(ending: &str) -> bool {
-    ENDINGS.contains(&ending) && !["gltf", "glb"].contains(&ending)
-}
-
-pub(super) fn ending(path: &Path) -> String {
+fn ending(path: &Path) -> String {
     path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase()
 }
 
@@ -52,7 +44,7 @@ pub fn check(source: &str) -> Result<()> {
         let why = std::io::Error::new(std::io::ErrorKind::IsADirectory, why);
         return Err(Error::io("read", path, why));
     }
-    if !ENDINGS.contains(&&*ending(path)) {
+    if !is_scene(path) {
         return Err(no_scene(source));
     }
     std::fs::File::open(path).map(|_| ()).map_err(|e| Error::io("read", path, e))
@@ -91,21 +83,21 @@ pub(super) fn no_scene(source: &str) -> Error {
             Some(name) => format!("did you mean '{BUILTIN}{name}'?"),
             None => {
                 let names: Vec<String> = names().map(|n| format!("{BUILTIN}{n}")).collect();
-                format!("give a .{} file, or one of {}", ENDINGS.join(", ."), names.join(", "))
+                format!("give a {} file, or one of {}", endings(), names.join(", "))
             }
         };
         return Error::config(format_args!("unknown scene '{source}'"), hint);
     }
     Error::config(
         format_args!("'{source}': scenes do not come as '.{ending}'"),
-        format_args!("give a file that is one of .{}, or builtin:NAME", ENDINGS.join(", .")),
+        format_args!("give a file that is one of {}, or builtin:NAME", endings()),
     )
 }
 
 /// The error about a built-in scene, or, where what is named so is a file, about that.
 pub(super) fn no_builtin(source: &str, error: Error) -> Error {
     let name = source.strip_prefix(BUILTIN).unwrap_or(source);
-    if !ENDINGS.contains(&&*ending(Path::new(name))) {
+    if !is_scene(Path::new(name)) {
         return error;
     }
     let what = format_args!("'{name}' is a file and no built-in scene");

@@ -41,13 +41,13 @@ pub struct EnsembleErrors {
     pub seeds: usize,
     /// How many pixels.
     pub pixels: u64,
-    /// Root of the mean square error on linear values.
+    /// Root of the mean square error on the pictures' own values.
     pub rmse: Estimate,
     /// Root of the mean square error on sRGB-encoded values.
     pub rmse_srgb: Estimate,
-    /// Mean of picture minus reference, on linear values.
+    /// Mean of picture minus reference, on the pictures' own values.
     pub mean: Estimate,
-    /// Largest absolute difference of any run, on linear values.
+    /// Largest absolute difference of any run, on the same.
     pub max: f64,
     /// Mean over pixels and channels of the variance over seeds; in squared
     /// units. `None` for a single seed.

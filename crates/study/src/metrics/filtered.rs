@@ -9,7 +9,7 @@ use screendoor_trace::tile::TileGrid;
 const REACH: f64 = 4.0;
 
 /// Root mean square error over the pixels and channels of `region`, in 8-bit units on
-/// linear values, after the error of the whole frame was filtered with a Gaussian of
+/// the pictures' own values, after the error of the whole frame was filtered with a Gaussian of
 /// standard deviation `sigma` pixels.
 ///
 /// The Gaussian is cut off at four deviations; what of it lies outside the frame is left

@@ -1,8 +1,9 @@
 //! How far a picture is from the exact one.
 //!
-//! Errors are in 8-bit units: 1 is 1/255 of the range from black to white. On
-//! linear values they are those of the light itself; on sRGB-encoded ones, those
-//! of the numbers that an 8-bit display would be sent.
+//! Errors are in 8-bit units: 1 is 1/255 of the range from black to white. They are taken of
+//! the pictures' own values: where those are linear, as they are unless a trace says
+//! otherwise, they are errors of the light itself; on sRGB-encoded ones, those of the numbers
+//! that an 8-bit display would be sent.
 //!
 //! Beside them stand what a viewer would see of an error ([`Flip`]), how it is spread over
 //! spatial frequencies ([`Spectrum`]), what a filter leaves of it ([`filtered_rmse`]), how
@@ -45,13 +46,13 @@ pub const ROUNDING: f64 = 1e-3;
 pub struct Errors {
     /// How many pixels it is over.
     pub pixels: u64,
-    /// Root mean square over pixels and channels, on linear values.
+    /// Root mean square over pixels and channels, on the pictures' own values.
     pub rmse: f64,
     /// The same on sRGB-encoded values, clamped to their range.
     pub rmse_srgb: f64,
-    /// Mean of picture minus reference, on linear values.
+    /// Mean of picture minus reference, on the same.
     pub mean: f64,
-    /// Largest absolute difference of a channel, on linear values.
+    /// Largest absolute difference of a channel, on the same.
     pub max: f64,
 }
 

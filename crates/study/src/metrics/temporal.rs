@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The standard deviation over seeds of a pixel's linear value (root mean square over
+/// The standard deviation over seeds of a pixel's own value (root mean square over
 /// its channels), in 8-bit units, as it is distributed over a region's pixels: what a
 /// viewer of a still scene sees change from frame to frame.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]

@@ -26,15 +26,11 @@ pub struct Explained<'a> {
     /// The seed.
     pub seed: u32,
     /// What the numbers of colours stand for, where it is not light.
-    #[serde(skip_serializing_if = "is_linear")]
+    #[serde(skip_serializing_if = "Space::is_linear")]
     pub space: Space,
     /// Fragment by fragment. Passes that do not look at a fragment are left out.
     #[serde(flatten)]
     pub explanation: Explanation,
-}
-
-fn is_linear(space: &Space) -> bool {
-    *space == Space::Linear
 }
 
 impl<'a> Explained<'a> {

@@ -8,9 +8,10 @@ use serde::{Deserialize, Serialize};
 use crate::study::engine::EngineName;
 use screendoor_designs::{Configured, configure};
 use screendoor_scene::capture::{
-    CameraOptions, CaptureOptions, Faces, Order, PatternKind, Pose, Poses, SplatRules, pattern,
+    CameraChoice, CameraOptions, CaptureOptions, Chosen, Faces, Order, PatternKind, SplatRules,
+    pattern,
 };
-use screendoor_scene::scene::{self, Axes, FileCamera, LoadOptions, Scene};
+use screendoor_scene::scene::{self, Axes, LoadOptions, Scene};
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::param::Options;
 use screendoor_trace::picture::Space;
@@ -110,9 +111,10 @@ pub struct SceneEntry {
     /// In its place, a trace.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub trace: Option<String>,
-    /// Frame width and height in pixels.
-    #[serde(default = "defaults::size")]
-    pub size: [u32; 2],
+    /// Frame width and height in pixels; where not given, 512 each, or those of the camera in a
+    /// file of cameras.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub size: Option<[u32; 2]>,
     /// Opacity in place of the materials' own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub alpha: Option<f32>,
@@ -179,6 +181,8 @@ mod defaults {
 
     /// Samples per pixel of the pictures that are kept, where there are so many.
     pub(super) const PICTURES: u32 = 8;
+    /// The frame of what has no camera with one of its own.
+    pub(super) const SIZE: [u32; 2] = [512, 512];
 
     pub(super) fn seeds() -> u32 {
         8
@@ -194,9 +198,6 @@ mod defaults {
     }
     pub(super) fn memory() -> u64 {
         512
-    }
-    pub(super) fn size() -> [u32; 2] {
-        [512, 512]
     }
     pub(super) fn order() -> Order {
         Order::Api
@@ -284,6 +285,10 @@ impl Study {
                 scene.captured_samples = most;
             }
         }
+        // A camera of a file has its own.
+        for scene in self.scenes.iter_mut().filter(|scene| !scene.has_camera_file()) {
+            scene.size = scene.size.or(Some(defaults::SIZE));
+        }
     }
 
     fn check(&self) -> Result<()> {
@@ -362,34 +367,34 @@ impl SceneEntry {
         scene::load_with(&scene::seen_from(source, base), &options)
     }
 
-    /// What of its camera's file is not honoured.
-    ///
-    /// # Errors
-    /// As [`Poses::read`].
-    pub fn camera_warnings(&self, base: &Path) -> Result<Vec<String>> {
-        let file = self.camera.as_ref().filter(|path| Poses::is_file(Path::new(path)));
-        let poses = file.map(|path| Poses::read(&base.join(path), self.size)).transpose()?;
-        Ok(poses.map_or(Vec::new(), |poses| poses.warnings))
+    /// Which camera it asks for; its file is seen from the folder `base`.
+    pub fn camera_choice(&self, base: &Path) -> CameraChoice<'_> {
+        let seen =
+            |path: &String| if self.has_camera_file() { base.join(path) } else { path.into() };
+        CameraChoice {
+            camera: self.camera.as_ref().map(seen),
+            name: self.camera_name.as_deref(),
+            size: self.size,
+            default_size: defaults::SIZE,
+        }
     }
 
-    /// How it is captured, where its file has these cameras; paths are seen from the folder
-    /// `base`.
+    fn has_camera_file(&self) -> bool {
+        self.camera.as_ref().is_some_and(|path| CameraChoice::is_file(Path::new(path)))
+    }
+
+    /// Its frame where no camera has one of its own.
+    pub(crate) fn frame(&self) -> [u32; 2] {
+        self.size.unwrap_or(defaults::SIZE)
+    }
+
+    /// How it is captured, seen by the camera that was chosen for it.
     ///
     /// # Errors
-    /// As [`Poses::read`], [`Poses::choose`], [`Pose::of_file`] and [`SplatRules::parse`].
-    pub fn options(&self, base: &Path, cameras: &[FileCamera]) -> Result<CaptureOptions> {
-        let pose = self.camera.as_ref().map(|path| {
-            if !Poses::is_file(Path::new(path)) {
-                return Pose::of_file(cameras, path, self.size);
-            }
-            let poses = Poses::read(&base.join(path), self.size)?;
-            poses.choose(self.camera_name.as_deref()).cloned()
-        });
-        let pose = pose.transpose()?;
+    /// As [`SplatRules::parse`].
+    pub fn options(&self, chosen: Chosen) -> Result<CaptureOptions> {
         let splats = self.splat_rules.as_deref().map(SplatRules::parse);
-        // A camera has a frame of its own, where the study does not say another.
-        let own = pose.as_ref().map(|pose| pose.size).filter(|_| self.size == defaults::size());
-        let [width, height] = own.unwrap_or(self.size);
+        let [width, height] = chosen.size;
         Ok(CaptureOptions {
             width,
             height,
@@ -404,13 +409,23 @@ impl SceneEntry {
                 angle: self.angle,
                 distance: self.distance,
                 field_of_view: self.fov,
-                pose,
-                ..CameraOptions::default()
+                pose: chosen.pose,
             },
             splats: splats.transpose()?.unwrap_or_default(),
             space: self.space,
             ..CaptureOptions::default()
         })
+    }
+
+    /// Refuses a pixel outside of a frame of that size.
+    pub(in crate::study) fn check_pixel(&self, [width, height]: [u32; 2]) -> Result<()> {
+        match self.pixel {
+            Some([x, y]) if u32::from(x) >= width || u32::from(y) >= height => {
+                let range = format_args!("0 to {} and 0 to {}", width - 1, height - 1);
+                Err(out_of_range("pixel", format_args!("{x}, {y}"), range))
+            }
+            _ => Ok(()),
+        }
     }
 
     fn check(&self, samples: &[u32]) -> Result<()> {
@@ -428,8 +443,10 @@ impl SceneEntry {
                 "give one of the two",
             ));
         }
-        if self.size.iter().any(|side| !(1..=MAX_SIDE).contains(side)) {
-            let [w, h] = self.size;
+        let sides = self.size.iter().flatten();
+        if let Some([w, h]) =
+            self.size.filter(|_| sides.clone().any(|side| !(1..=MAX_SIDE).contains(side)))
+        {
             return Err(out_of_range("size", format_args!("{w}, {h}"), "1 to 65536 pixels a side"));
         }
         if !SamplePattern::is_count(self.captured_samples) {
@@ -447,19 +464,14 @@ impl SceneEntry {
                 "give one of the two",
             ));
         }
-        let of_file = self.camera.as_ref().is_some_and(|path| Poses::is_file(Path::new(path)));
-        if self.camera_name.is_some() && !of_file {
+        if self.camera_name.is_some() && !self.has_camera_file() {
             return Err(Error::config(
                 format_args!("scene '{name}' has a camera_name and no file of cameras"),
                 "give the file of cameras as 'camera'",
             ));
         }
-        if let Some([x, y]) = self.pixel.filter(|_| self.trace.is_none()) {
-            let [width, height] = self.size;
-            if u32::from(x) >= width || u32::from(y) >= height {
-                let range = format_args!("0 to {} and 0 to {}", width - 1, height - 1);
-                return Err(out_of_range("pixel", format_args!("{x}, {y}"), range));
-            }
+        if let Some(size) = self.size.filter(|_| self.trace.is_none()) {
+            self.check_pixel(size)?;
         }
         if self.trace.is_none() {
             let recorded = pattern(self.pattern, self.captured_samples)?;

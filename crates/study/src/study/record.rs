@@ -86,7 +86,7 @@ pub struct Record {
     /// The same over the other covered pixels.
     pub edges: EnsembleErrors,
     /// RMSE over all covered pixels against the exact picture of all of the trace's
-    /// samples, in 8-bit units on linear values: missing antialiasing counts.
+    /// samples, in 8-bit units: missing antialiasing counts.
     pub fine: Estimate,
     /// RMSE over the covered pixels after a Gaussian on the error, in 8-bit units: what is
     /// left of it from afar. Empty where it was not asked for.
@@ -285,9 +285,39 @@ impl Record {
         (self.fragments > 0).then(|| self.tied_fragments as f64 / self.fragments as f64)
     }
 
+    /// Variance and squared bias over the covered pixels: what the mean square error is made up
+    /// of. All of it is bias where seeds change nothing; of one draw of many neither is known.
+    pub fn parts(&self) -> Option<(f64, Estimate)> {
+        let errors = &self.covered;
+        match (errors.variance, errors.bias_squared) {
+            (Some(variance), Some(bias)) => Some((variance, bias)),
+            _ => (!self.promises.seeded)
+                .then(|| (0.0, Estimate::exactly(errors.rmse.value * errors.rmse.value))),
+        }
+    }
+
     /// Whether seeds change the picture and only one was replayed, so that neither the mean
     /// error has an interval nor variance and bias are known.
     pub fn is_one_draw(&self) -> bool {
         self.promises.seeded && self.seeds < 2
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::analysis::made_up;
+
+    #[test]
+    fn an_error_without_noise_is_bias_and_one_draw_of_many_is_not_known() {
+        let mut record = made_up::record("s", "a", 8, Estimate::exactly(3.0));
+        record.covered.variance = Some(8.0);
+        record.covered.bias_squared = Some(Estimate::exactly(1.0));
+        assert_eq!(record.parts(), Some((8.0, Estimate::exactly(1.0))));
+        (record.covered.variance, record.covered.bias_squared) = (None, None);
+        record.promises.seeded = true;
+        assert_eq!(record.parts(), None);
+        record.promises.seeded = false;
+        assert_eq!(record.parts(), Some((0.0, Estimate::exactly(9.0))));
     }
 }

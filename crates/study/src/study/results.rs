@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::study::file::Study;
 use crate::study::record::Record;
+use screendoor_trace::picture::Space;
 use screendoor_trace::trace::{Statistics, View};
 
 /// A study with what has been measured of it.
@@ -43,6 +44,9 @@ pub struct SceneFacts {
     /// The same in numbers, where the trace has them. They are no part of the content.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub view: Option<View>,
+    /// What the trace's colours stand for, and so in what values errors are.
+    #[serde(default, skip_serializing_if = "Space::is_linear")]
+    pub space: Space,
     /// What its file holds and is not drawn, a line for each kind.
     #[serde(default)]
     pub warnings: Vec<String>,
@@ -135,9 +139,49 @@ impl Results {
         list
     }
 
+    /// In what values errors are: those of the scenes' traces.
+    pub fn values(&self) -> String {
+        let encoded: Vec<&str> =
+            self.scenes.iter().filter(|s| !s.space.is_linear()).map(|s| &*s.name).collect();
+        match encoded.len() {
+            0 => "on linear values".to_string(),
+            n if n == self.scenes.len() => "on encoded values".to_string(),
+            _ => format!("on linear values (encoded ones of {})", encoded.join(", ")),
+        }
+    }
+
     /// The record of a design at a sample count on a scene.
     pub fn record(&self, scene: &str, series: &str, samples: u32) -> Option<&Record> {
         let wanted = |r: &&Record| r.scene == scene && r.series == series && r.samples == samples;
         self.records.iter().find(wanted)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::metrics::Estimate;
+    use crate::study::analysis::made_up::planted;
+
+    #[test]
+    fn what_errors_are_of_follows_the_traces() {
+        let mut results = planted(&["a", "b"], &[8], &[("lk", &[Estimate::exactly(1.0); 2])]);
+        assert_eq!(results.values(), "on linear values");
+        results.scenes[1].space = Space::Encoded;
+        assert_eq!(results.values(), "on linear values (encoded ones of b)");
+        results.scenes[0].space = Space::Encoded;
+        assert_eq!(results.values(), "on encoded values");
+    }
+
+    #[test]
+    fn facts_of_older_folders_are_of_linear_colours() {
+        let results = planted(&["a"], &[8], &[("lk", &[Estimate::exactly(1.0)])]);
+        let mut facts = serde_json::to_value(&results.scenes[0]).unwrap();
+        assert!(facts.get("space").is_none());
+        let read: SceneFacts = serde_json::from_value(facts.clone()).unwrap();
+        assert_eq!(read.space, Space::Linear);
+        facts["space"] = "encoded".into();
+        let read: SceneFacts = serde_json::from_value(facts).unwrap();
+        assert_eq!(read.space, Space::Encoded);
     }
 }

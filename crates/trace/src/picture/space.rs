@@ -13,6 +13,11 @@ crate::options! {
 }
 
 impl Space {
+    /// Whether numbers are amounts of light: what is meant where nothing is said.
+    pub fn is_linear(&self) -> bool {
+        *self == Space::Linear
+    }
+
     /// The amount of light of a number, which may lie outside of 0 to 1.
     pub fn to_linear(self, value: f64) -> f64 {
         match self {

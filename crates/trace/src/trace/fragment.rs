@@ -176,7 +176,7 @@ pub struct Fragment {
     pub coverage: SampleMask,
     /// Depth over the pixel.
     pub depth: DepthPlane,
-    /// Linear colour, not multiplied by alpha.
+    /// Colour, not multiplied by alpha: linear, or as the trace's space says.
     pub colour: [f32; 3],
     /// Opacity in [0, 1].
     pub alpha: f32,

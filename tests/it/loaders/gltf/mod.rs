@@ -7,7 +7,7 @@ pub mod model;
 mod table;
 
 use glam::{Vec2, Vec3};
-use screendoor::capture::{CameraOptions, Capture, CaptureOptions, Pose};
+use screendoor::capture::{CameraChoice, CameraOptions, Capture, CaptureOptions};
 use screendoor::error::Error;
 use screendoor::scene::{Scene, Shape};
 use serde_json::{Value, json};
@@ -148,6 +148,14 @@ fn splats_of_drafts_are_read_and_what_is_not_known_is_told() {
             json!({ "KHR_gaussian_splatting": { key: value } });
         warned(&model.load().unwrap(), 1, &[says]);
     }
+    // What is no point is no splat, and no triangle either.
+    let mut model = Model::quad();
+    model.another(4);
+    model.json["meshes"][0]["primitives"][1]["extensions"] =
+        json!({ "KHR_gaussian_splatting": {} });
+    let scene = model.load().unwrap();
+    assert_eq!(scene.shapes.len(), 1);
+    warned(&scene, 1, &["KHR_gaussian_splatting is for points"]);
 }
 
 #[test]
@@ -166,10 +174,15 @@ fn the_file_s_cameras_see_what_they_are_set_on() {
     ]);
     model.json["scenes"][0]["nodes"] = json!([0, 1, 2]);
     let scene = model.load().unwrap();
-    let pose = |name: &str| Pose::of_file(&scene.cameras, name, [16, 16]);
+    let chosen = |name: &str| {
+        let camera = Some(name.into());
+        let choice =
+            CameraChoice { camera, name: None, size: Some([16, 16]), default_size: [1, 1] };
+        choice.choose(&scene.cameras)
+    };
     // The square fills the frame and ends with it.
     for name in ["close", "0"] {
-        let camera = CameraOptions { pose: Some(pose(name).unwrap()), ..Default::default() };
+        let camera = CameraOptions { pose: chosen(name).unwrap().pose, ..Default::default() };
         let options =
             CaptureOptions { width: 16, height: 16, samples: 4, camera, ..Default::default() };
         let trace = Capture::new(&scene, &options).unwrap().to_memory(|_, _| ()).unwrap();
@@ -178,8 +191,7 @@ fn the_file_s_cameras_see_what_they_are_set_on() {
         assert_eq!(covered.sum::<u32>(), 16 * 16 * 4, "{name}");
     }
     for (name, says) in [("flat", "not one in perspective"), ("clos", "close"), ("2", "unknown")] {
-        let error = pose(name).unwrap_err().to_string();
+        let error = chosen(name).unwrap_err().to_string();
         assert!(error.contains(says), "{error}");
     }
-    assert!(Pose::of_file(&[], "a", [16, 16]).unwrap_err().to_string().contains("has none"));
 }

@@ -27,7 +27,7 @@ struct Trained {
     fy: f64,
 }
 
-/// `transforms.json`. What frames say of their lenses comes before what the file says.
+/// `transforms.json`. A lens is the file's, for all frames, or a frame's own.
 #[derive(Deserialize)]
 struct Transforms {
     #[serde(flatten)]
@@ -36,6 +36,9 @@ struct Transforms {
     #[serde(default)]
     is_fisheye: bool,
     frames: Vec<Frame>,
+    /// What nerfstudio has turned and scaled the cameras by.
+    applied_transform: Option<Value>,
+    applied_scale: Option<Value>,
 }
 
 /// The models of cameras whose lenses are pinholes, but for their distortion.
@@ -77,26 +80,21 @@ struct Lens {
 }
 
 /// The cameras of a file, in its order.
-#[derive(Clone, Debug)]
-pub struct Poses {
-    /// The cameras.
-    pub poses: Vec<Pose>,
+#[derive(Debug)]
+pub(super) struct Poses {
+    /// The cameras; never empty.
+    pub(super) poses: Vec<Pose>,
     /// What could not be honoured.
-    pub warnings: Vec<String>,
+    pub(super) warnings: Vec<String>,
 }
 
 impl Poses {
-    /// Whether a camera's name is that of a file of cameras, and not one of the scene's own.
-    pub fn is_file(name: &Path) -> bool {
-        name.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"))
-    }
-
     /// Reads the cameras of the file at `path`. Where it says nothing of its frames' size they
     /// have the size `frame`, in pixels.
     ///
     /// # Errors
     /// [`Error::Io`] where it cannot be read, [`Error::Invalid`] where it holds no cameras.
-    pub fn read(path: &Path, frame: [u32; 2]) -> Result<Self> {
+    pub(super) fn read(path: &Path, frame: [u32; 2]) -> Result<Self> {
         let place = path.display().to_string();
         let bytes = file::read(path)?;
         if bytes.len() as u64 > MAX_BYTES {
@@ -127,44 +125,32 @@ impl Poses {
                     let what = format!("its cameras are of the model '{}'", one_line(model));
                     return Err(Error::unsupported(place, what, "give it undistorted cameras"));
                 }
-                let all = file.frames.iter().enumerate();
-                let poses = all.map(|(i, one)| {
-                    let lens = one.lens.or(file.lens);
-                    if lens.is_distorted() && warnings.is_empty() {
-                        let what = "its lenses' distortion is left out: give undistorted cameras";
-                        warnings.push(format!("{place}: {what}"));
-                    }
+                let mut distorted = false;
+                let mut one = |i: usize, one: &Frame| {
+                    let lens = one.lens.or(&file.lens)?;
+                    distorted |= lens.is_distorted();
                     transformed(i, one, &lens, frame)
-                        .map_err(|what| bad(format!("frame {i} of it: {what}")))
+                };
+                let all = file.frames.iter().enumerate().map(|(i, frame)| {
+                    one(i, frame).map_err(|what| bad(format!("frame {i} of it: {what}")))
                 });
-                poses.collect::<Result<_>>()?
+                let poses = all.collect::<Result<_>>()?;
+                if distorted {
+                    let what = "its lenses' distortion is left out: give undistorted cameras";
+                    warnings.push(format!("{place}: {what}"));
+                }
+                if file.is_moved() {
+                    let what = "its cameras stand where 'applied_transform' and 'applied_scale' \
+                                have put them, which is not undone: the scene has to be moved so, too";
+                    warnings.push(format!("{place}: {what}"));
+                }
+                poses
             }
         };
         if poses.is_empty() {
             return Err(Error::invalid(place, "it holds no camera", hint));
         }
         Ok(Poses { poses, warnings })
-    }
-
-    /// The camera of that name, or that number counted from 0; the first where none is asked
-    /// for.
-    ///
-    /// # Errors
-    /// [`Error::Config`] where there is none.
-    pub fn choose(&self, wanted: Option<&str>) -> Result<&Pose> {
-        let Some(wanted) = wanted else { return Ok(&self.poses[0]) };
-        let named = self.poses.iter().find(|pose| pose.name == wanted);
-        let stem = |pose: &&Pose| {
-            let path = Path::new(&pose.name);
-            [path.file_name(), path.file_stem()]
-                .iter()
-                .flatten()
-                .any(|s| s.to_str() == Some(wanted))
-        };
-        let numbered = || wanted.parse().ok().and_then(|i: usize| self.poses.get(i));
-        named.or_else(|| self.poses.iter().find(stem)).or_else(numbered).ok_or_else(|| {
-            Error::unknown("camera", wanted, self.poses.iter().map(|pose| pose.name.as_str()))
-        })
     }
 }
 
@@ -197,24 +183,80 @@ fn trained(i: usize, camera: Trained) -> std::result::Result<Pose, String> {
     })
 }
 
+impl Transforms {
+    /// Whether its cameras are said to be turned, moved or scaled. What is no matrix is taken
+    /// for one that does.
+    fn is_moved(&self) -> bool {
+        let moved = self.applied_transform.as_ref().is_some_and(|matrix| {
+            let rows: Option<Vec<Vec<f64>>> = serde_json::from_value(matrix.clone()).ok();
+            let still = |rows: Vec<Vec<f64>>| {
+                rows.iter().enumerate().all(|(i, row)| {
+                    let own =
+                        |(k, v): (usize, &f64)| (v - f64::from(u8::from(i == k))).abs() < 1e-6;
+                    row.iter().enumerate().all(own)
+                })
+            };
+            !rows.is_some_and(still)
+        });
+        let scaled = self.applied_scale.as_ref().is_some_and(|s| s.as_f64() != Some(1.0));
+        moved || scaled
+    }
+}
+
 impl Lens {
-    fn or(self, other: Lens) -> Self {
-        Lens {
-            w: self.w.or(other.w),
-            h: self.h.or(other.h),
-            fl_x: self.fl_x.or(other.fl_x),
-            fl_y: self.fl_y.or(other.fl_y),
-            cx: self.cx.or(other.cx),
-            cy: self.cy.or(other.cy),
-            camera_angle_x: self.camera_angle_x.or(other.camera_angle_x),
-            camera_angle_y: self.camera_angle_y.or(other.camera_angle_y),
-            k1: self.k1.or(other.k1),
-            k2: self.k2.or(other.k2),
-            k3: self.k3.or(other.k3),
-            k4: self.k4.or(other.k4),
-            p1: self.p1.or(other.p1),
-            p2: self.p2.or(other.p2),
+    /// What it says of each thing that makes up a projection, with the thing's name.
+    fn parts(&self) -> [(&'static str, Option<f64>); 6] {
+        [
+            ("w", self.w),
+            ("h", self.h),
+            ("fl_x", self.fl_x.or(self.camera_angle_x)),
+            ("fl_y", self.fl_y.or(self.camera_angle_y)),
+            ("cx", self.cx),
+            ("cy", self.cy),
+        ]
+    }
+
+    /// This one, a frame's, where it has a focal length, else the file's lens with what this one
+    /// adds to it. Programs differ in which of both they take a number from that both have, so
+    /// that half of a lens is none: nerfstudio has all of it in the file or all in each frame.
+    fn or(self, file: &Lens) -> std::result::Result<Self, String> {
+        let both = self.parts().into_iter().zip(file.parts());
+        let is_own = |v: &Option<f64>| v.is_some();
+        if is_own(&self.fl_x.or(self.camera_angle_x)) || is_own(&self.fl_y.or(self.camera_angle_y))
+        {
+            let lacks = both.filter(|((_, own), (_, file))| own.is_none() && file.is_some());
+            let lacks: Vec<&str> = lacks.map(|((name, _), _)| name).collect();
+            return match lacks.first() {
+                None => Ok(self),
+                Some(name) => Err(format!(
+                    "it has a focal length of its own and no '{name}', which the file has for \
+                     all: a frame has all of its lens or none"
+                )),
+            };
         }
+        let differs = |((_, own), (_, file)): &(_, (_, Option<f64>))| {
+            let (own, file): (&Option<f64>, &Option<f64>) = (own, file);
+            own.zip(*file).is_some_and(|(own, file)| own != file)
+        };
+        if let Some(((name, _), _)) = both.clone().find(differs) {
+            return Err(format!(
+                "its '{name}' is another one than the file's, whose focal length it has: a frame \
+                 has all of its lens or none"
+            ));
+        }
+        Ok(Lens {
+            w: self.w.or(file.w),
+            h: self.h.or(file.h),
+            cx: self.cx.or(file.cx),
+            cy: self.cy.or(file.cy),
+            k1: self.k1.or(file.k1),
+            k2: self.k2.or(file.k2),
+            k3: self.k3.or(file.k3),
+            k4: self.k4.or(file.k4),
+            p1: self.p1.or(file.p1),
+            p2: self.p2.or(file.p2),
+            ..*file
+        })
     }
 
     fn is_distorted(&self) -> bool {
@@ -297,24 +339,57 @@ mod tests {
     }
 
     #[test]
-    fn cameras_are_chosen_by_name_stem_or_number() {
-        let camera = |name: &str| Pose {
-            name: name.into(),
-            eye: DVec3::ZERO,
-            axes: [DVec3::X, DVec3::Y, DVec3::Z],
-            focal: [1.0; 2],
-            principal: [0.5; 2],
-            size: [1; 2],
+    fn a_lens_is_the_file_s_or_a_frame_s_own() {
+        let of = |file: &str, frame: &str| {
+            let matrix = "[[1,0,0,0],[0,1,0,0],[0,0,1,0]]";
+            read(&format!(r#"{{{file} "frames": [{{{frame} "transform_matrix": {matrix}}}]}}"#))
         };
-        let poses = vec![camera("images/b.png"), camera("7"), camera("c")];
-        let all = Poses { poses, warnings: Vec::new() };
-        let chosen = |wanted| all.choose(wanted).map(|p| p.name.clone());
-        assert_eq!(chosen(None).unwrap(), "images/b.png");
-        assert_eq!(chosen(Some("b")).unwrap(), "images/b.png");
-        assert_eq!(chosen(Some("b.png")).unwrap(), "images/b.png");
-        assert_eq!(chosen(Some("7")).unwrap(), "7");
-        assert_eq!(chosen(Some("2")).unwrap(), "c");
-        assert!(chosen(Some("3")).is_err());
+        let lens = |file: &str, frame: &str| {
+            let pose = of(file, frame).unwrap().poses[0].clone();
+            (pose.focal, pose.principal, pose.size)
+        };
+        let all = r#""fl_x": 30, "fl_y": 31, "cx": 9, "cy": 8, "w": 20, "h": 10,"#;
+        let own = ([30.0, 31.0], [9.0, 8.0], [20, 10]);
+        let other = r#""fl_x": 5, "fl_y": 6, "cx": 1, "cy": 2, "w": 4, "h": 3, "k1": 0,"#;
+        assert_eq!(lens(all, ""), own);
+        assert_eq!(lens("", all), own);
+        assert_eq!(lens(other, all), own);
+        // What the file leaves out, frames may add, and say again what it says.
+        assert_eq!(
+            lens(r#""fl_x": 30, "fl_y": 31, "w": 20, "h": 10,"#, r#""cx": 9, "cy": 8, "w": 20,"#),
+            own
+        );
+        for (frame, part) in [
+            (r#""fl_x": 5,"#, "'w'"),
+            (r#""fl_x": 5, "fl_y": 6, "w": 4, "h": 3,"#, "'cx'"),
+            (r#""camera_angle_x": 1, "cx": 1, "cy": 2, "w": 4, "h": 3,"#, "'fl_y'"),
+            (r#""w": 4, "h": 3,"#, "its 'w' is another one"),
+        ] {
+            let error = of(all, frame).unwrap_err().to_string();
+            assert!(error.contains(part) && error.contains("frame 0 of it"), "{error}");
+        }
+    }
+
+    #[test]
+    fn cameras_that_were_moved_are_told_of() {
+        let of = |said: &str| {
+            let frame = r#""frames": [{"transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,0]]}]"#;
+            read(&format!(r#"{{"fl_x": 4, {said} {frame}}}"#)).unwrap().warnings
+        };
+        for still in
+            ["", r#""applied_transform": [[1,0,0,0],[0,1,0,0],[0,0,1,0]], "applied_scale": 1,"#]
+        {
+            assert!(of(still).is_empty(), "{still}");
+        }
+        for moved in [
+            r#""applied_transform": [[0,1,0,0],[1,0,0,0],[0,0,-1,0]],"#,
+            r#""applied_transform": [[1,0,0,2],[0,1,0,0],[0,0,1,0]],"#,
+            r#""applied_transform": "none","#,
+            r#""applied_scale": 0.5,"#,
+        ] {
+            let told = of(moved);
+            assert!(told.len() == 1 && told[0].contains("applied_transform"), "{told:?}");
+        }
     }
 
     #[test]

@@ -4,7 +4,8 @@ use std::f64::consts::PI;
 
 use glam::{DMat3, DMat4, DVec3, DVec4};
 
-use crate::capture::camera::{Camera, CameraOptions, NEAREST_AMONG, range};
+use crate::capture::camera::{Camera, NEAREST_AMONG, range};
+use crate::capture::splat::SplatRules;
 use crate::scene::{FileCamera, Scene};
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::trace::{Projection, View};
@@ -32,24 +33,14 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// The camera of a scene's file of that name, or of that number counted from 0, over a frame
-    /// of `size` pixels.
+    /// A camera of the scene's own file, over a frame of `size` pixels.
     ///
     /// # Errors
-    /// [`Error::Config`] where there is none, or its lines of sight are parallel.
-    pub fn of_file(cameras: &[FileCamera], wanted: &str, size: [u32; 2]) -> Result<Self> {
-        let named = cameras.iter().find(|camera| camera.name == wanted);
-        let numbered = || wanted.parse().ok().and_then(|i: usize| cameras.get(i));
-        let Some(camera) = named.or_else(numbered) else {
-            if cameras.is_empty() {
-                let what = format_args!("there is no camera '{wanted}': the scene's file has none");
-                return Err(Error::config(what, "name a .json file of cameras, or give --angle"));
-            }
-            return Err(Error::unknown("camera", wanted, cameras.iter().map(|c| c.name.as_str())));
-        };
+    /// [`Error::Config`] where its lines of sight are parallel.
+    pub fn of_file(camera: &FileCamera, size: [u32; 2]) -> Result<Self> {
         let Some(field) = camera.field_of_view.filter(|f| *f > 0.0 && *f < PI) else {
-            let what = format_args!("the camera '{wanted}' is not one in perspective");
-            return Err(Error::config(what, "give --angle and --fov"));
+            let what = format_args!("the camera '{}' is not one in perspective", camera.name);
+            return Err(Error::config(what, "give an angle and a field of view in its place"));
         };
         let axes = camera.place.matrix3;
         let unit = |v: DVec3| v.normalize_or_zero();
@@ -64,18 +55,11 @@ impl Pose {
         })
     }
 
-    /// The camera over a frame of `width` × `height` pixels of the same shape.
+    /// Finds out whether it is one, over a frame of that size.
     ///
     /// # Errors
-    /// [`Error::Config`] for a pose that is none, a frame of another shape, and where the
-    /// scene lies behind it.
-    pub(super) fn camera(
-        &self,
-        scene: &Scene,
-        width: u32,
-        height: u32,
-        options: &CameraOptions,
-    ) -> Result<Camera> {
+    /// [`Error::Config`] where its axes or its lens are none, and for a frame of another shape.
+    pub(super) fn check(&self, [width, height]: [u32; 2]) -> Result<()> {
         let bad = |what: String, hint: &str| {
             Err(Error::config(format_args!("the camera '{}' {what}", self.name), hint))
         };
@@ -97,15 +81,33 @@ impl Pose {
                 "give it a size in pixels and focal lengths of a thousandth to 10000 of it",
             );
         }
-        let scale = [width, height].map(f64::from);
-        let scale = [0, 1].map(|i| scale[i] / f64::from(self.size[i]));
+        let scale = self.scale([width, height]);
         if (scale[0] / scale[1] - 1.0).abs() > SHAPE {
             let [w, h] = self.size;
             let what =
                 format!("is one of {w}x{h} pixels, and not of the shape of {width}x{height}");
-            return bad(what, "give --size that shape");
+            return bad(what, "give the frame that shape");
         }
+        Ok(())
+    }
 
+    /// How many pixels of a frame of that size one of its own is.
+    fn scale(&self, size: [u32; 2]) -> [f64; 2] {
+        [0, 1].map(|i| f64::from(size[i]) / f64::from(self.size[i]))
+    }
+
+    /// The camera over a frame of `size` pixels of the same shape.
+    ///
+    /// # Errors
+    /// As [`Pose::check`], and where the scene lies behind it.
+    pub(super) fn camera(
+        &self,
+        scene: &Scene,
+        rules: &SplatRules,
+        size: [u32; 2],
+    ) -> Result<Camera> {
+        self.check(size)?;
+        let scale = self.scale(size);
         let turn = scene.world.matrix3;
         let forward = (turn * self.axes[2]).normalize();
         let right = turn * self.axes[0];
@@ -122,7 +124,7 @@ impl Pose {
         // Something flat still needs a depth range.
         let solid = (near * 0.999, far * 1.001);
         let [near, far] =
-            range(scene, solid, NEAREST_AMONG, (eye, forward, options)).map_err(|e| match e {
+            range(scene, solid, NEAREST_AMONG, (eye, forward, rules)).map_err(|e| match e {
                 Error::Config { what, hint } => {
                     Error::Config { what: format!("camera '{}': {what}", self.name), hint }
                 }
@@ -130,7 +132,7 @@ impl Pose {
             })?;
         let focal = [0, 1].map(|i| self.focal[i] * scale[i]);
         let principal = [0, 1].map(|i| self.principal[i] * scale[i]);
-        let size = [f64::from(width), f64::from(height)];
+        let size = size.map(f64::from);
         let to_view = DMat4::from_mat3(DMat3::from_cols(right, up, back).transpose())
             * DMat4::from_translation(-eye);
         let off = [0, 1].map(|i| 2.0 * principal[i] / size[i] - 1.0);
@@ -165,9 +167,9 @@ impl Pose {
 
 #[cfg(test)]
 mod tests {
+    use super::super::testing::cube;
     use super::*;
-    use crate::scene::{Mesh, Shape};
-    use glam::Vec3;
+    use crate::capture::CameraOptions;
 
     fn pose() -> Pose {
         Pose {
@@ -180,26 +182,14 @@ mod tests {
         }
     }
 
-    fn scene() -> Scene {
-        let corner = |i: u32| Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32);
-        let mesh = Mesh {
-            positions: (0..8).map(corner).collect(),
-            triangles: (0..6).map(|i| [i, i + 1, i + 2]).collect(),
-            ..Mesh::default()
-        };
-        let mut scene = Scene::default();
-        scene.add("cube", Shape::Mesh(mesh));
-        scene
-    }
-
     fn camera(pose: Pose, scene: &Scene, size: [u32; 2]) -> Result<Camera> {
         let options = CameraOptions { pose: Some(pose), ..CameraOptions::default() };
-        Camera::frame(scene, &options, size[0], size[1])
+        Camera::frame(scene, &options, &SplatRules::default(), size)
     }
 
     #[test]
     fn a_pose_projects_as_a_pinhole_does() {
-        let scene = scene();
+        let scene = cube();
         for scale in [1, 2] {
             let camera = camera(pose(), &scene, [80 * scale, 60 * scale]).unwrap();
             for (point, _) in scene.bounding_points() {
@@ -229,7 +219,7 @@ mod tests {
     #[test]
     fn what_is_no_camera_is_told() {
         let says = |pose: Pose, part: &str| {
-            let error = camera(pose, &scene(), [80, 60]).unwrap_err().to_string();
+            let error = camera(pose, &cube(), [80, 60]).unwrap_err().to_string();
             assert!(error.contains(part) && error.contains("'one'"), "{error}");
         };
         says(Pose { axes: [DVec3::X, DVec3::X, DVec3::Z], ..pose() }, "right angles");

@@ -146,6 +146,15 @@ impl Loader<'_> {
             };
             return Ok(Drawn { shape, items, matters, in_scene: false });
         }
+        if primitive.extensions.has(splats::NAME) {
+            let what = format_args!(
+                "{} is for points: splats of another mode are not drawn",
+                splats::NAME
+            );
+            matters.push(self.warnings.matter_of(unit, what));
+            let items = self.claimed_items(primitive, mode);
+            return Ok(Drawn { shape: None, items, matters, in_scene: false });
+        }
         if let Some(missed) = self.not_drawn(primitive, mode, unit) {
             matters.push(missed);
             let items = self.claimed_items(primitive, mode);

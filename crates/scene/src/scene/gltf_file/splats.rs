@@ -100,14 +100,9 @@ impl Loader<'_> {
                 Err(matter) => return Ok(Err(matter)),
             },
         };
-        let (mut splats, broken, told) = cloud.finish();
+        let (mut splats, told) = cloud.finish();
         self.scene.warnings.extend(told);
         splats.space = space.unwrap_or(Space::Encoded);
-        if broken > 0 {
-            let what = "have no finite place, size, turn, opacity or colour and show nothing";
-            let what = format_args!("{broken} splats of {part} {what}");
-            self.scene.warnings.push(format!("{}: {what}", self.place));
-        }
         Ok(Ok(splats))
     }
 
@@ -141,10 +136,10 @@ impl Loader<'_> {
         let opacities = opacity.map(|a| self.numbers(a, OPACITY, part)).transpose()?;
         let mut harmonics = Vec::new();
         let mut degree = 0;
-        'degrees: for l in 0..=4_usize {
+        for l in 0..=4_usize {
             let names = (0..=2 * l).map(|n| format!("{NAME}:SH_DEGREE_{l}_COEF_{n}"));
             let accessors: Option<Vec<usize>> = names.map(|name| of.get(&name).copied()).collect();
-            let Some(accessors) = accessors else { break 'degrees };
+            let Some(accessors) = accessors else { break };
             degree = l as u32;
             for accessor in accessors {
                 harmonics.push(self.numbers(accessor, HARMONIC, part)?);
@@ -177,7 +172,7 @@ impl Loader<'_> {
             harmonics.iter().map(|list| list.arrays(0.0).collect()).collect();
         let colours: Option<Vec<[f32; 4]>> = colours.map(|list| list.arrays(1.0).collect());
         let opacities: Option<Vec<[f32; 1]>> = opacities.map(|list| list.arrays(1.0).collect());
-        let mut cloud = Cloud::new(&self.place, degree, count);
+        let mut cloud = Cloud::new(&format!("{}, {part}", self.place), degree, count);
         let mut own = Vec::new();
         let turns = rotations.arrays(0.0).zip(scales.arrays(0.0)).zip(means.arrays(0.0));
         for (i, (([x, y, z, w], scales), mean)) in turns.enumerate() {

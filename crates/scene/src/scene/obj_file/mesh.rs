@@ -92,10 +92,10 @@ impl<'a> Builder<'a> {
     fn too_complex(&self, face: &Face, corners: &[[u32; 3]]) -> Error {
         let place = format!("{}, line {}", self.place, face.line);
         let what = format!(
-            "a face of {} corners that is not convex or crosses itself too often",
+            "a face of {} corners that is not convex or, with those before, takes too long to cut",
             corners.len()
         );
-        Error::unsupported(place, what, "divide it into polygons of fewer than 65536 corners")
+        Error::unsupported(place, what, "divide it into polygons of fewer corners")
     }
 
     /// Adds a vertex for a corner; its number. What the corner does not say is NaN.
@@ -137,36 +137,6 @@ fn filled(mut mesh: Mesh) -> Mesh {
         // OBJ counts v upwards.
         *uv = Vec2::new(given.x, 1.0 - given.y);
     }
-    if mesh.normals.iter().all(|n| n.is_nan()) {
-        mesh.normals.clear();
-    } else {
-        fill_normals(&mut mesh);
-    }
+    mesh.fill_normals();
     mesh
-}
-
-/// Gives corners without normals that of their triangle, on vertices of their own.
-fn fill_normals(mesh: &mut Mesh) {
-    for t in 0..mesh.triangles.len() {
-        let corners = mesh.triangles[t].map(|i| i as usize);
-        let [a, b, c] = corners.map(|i| mesh.positions[i]);
-        let flat = (b - a).cross(c - a).try_normalize().unwrap_or(Vec3::Z);
-        for (k, i) in corners.into_iter().enumerate() {
-            if mesh.normals[i].is_nan() {
-                mesh.triangles[t][k] = mesh.positions.len() as u32;
-                mesh.positions.push(mesh.positions[i]);
-                mesh.normals.push(flat);
-                if let Some(uv) = mesh.uvs.get(i).copied() {
-                    mesh.uvs.push(uv);
-                }
-                if let Some(colour) = mesh.colours.get(i).copied() {
-                    mesh.colours.push(colour);
-                }
-            }
-        }
-    }
-    // What is left without a normal is a vertex of no triangle.
-    for normal in mesh.normals.iter_mut().filter(|n| n.is_nan()) {
-        *normal = Vec3::Z;
-    }
 }

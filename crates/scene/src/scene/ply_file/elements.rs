@@ -1,16 +1,14 @@
-//! PLY files: their elements, as text or as bytes in either order.
-//!
-//! The header is the library's to parse; the rows are read in place, since the
-//! library makes a map of each.
+//! The elements of PLY files, as text or as bytes in either order: read in place, since the
+//! library makes a map of each row.
 
-use ply_rs_bw::parser::{Parser, Reader};
-use ply_rs_bw::ply::{DefaultElement, ElementDef, Encoding, PropertyType, ScalarType};
+use ply_rs_bw::ply::{ElementDef, PropertyType, ScalarType};
 
 use crate::scene::bytes::Bytes;
 use screendoor_trace::error::Result;
 
-/// The longest header that is read, in bytes.
-const MAX_HEADER: usize = 1 << 20;
+/// The most numbers that are held of elements with lists and of text, 8 bytes each: a byte of
+/// the file may be one.
+pub(super) const MAX_NUMBERS: usize = 1 << 28;
 
 /// An element: rows of the same properties.
 pub(in crate::scene) struct Element<'a> {
@@ -60,6 +58,18 @@ impl Element<'_> {
     /// The property of that name; `None` where there is none with one value a row.
     pub(in crate::scene) fn column(&self, name: &str) -> Option<Place> {
         self.columns.iter().position(|c| c.name == name).map(Place)
+    }
+
+    /// The properties of these names with one value a row; the first name that is missing.
+    pub(in crate::scene) fn columns<'n, const N: usize>(
+        &self,
+        names: [&'n str; N],
+    ) -> std::result::Result<[Place; N], &'n str> {
+        let mut found = [Place(0); N];
+        for (place, name) in found.iter_mut().zip(names) {
+            *place = self.column(name).ok_or(name)?;
+        }
+        Ok(found)
     }
 
     /// The names of the properties with one value a row.
@@ -136,18 +146,24 @@ fn number(bytes: &[u8], scalar: &ScalarType, big_endian: bool) -> f64 {
 }
 
 /// The next numbers of a file, whatever their encoding.
-enum Numbers<'a> {
+pub(super) struct Numbers<'a> {
+    pub(super) from: Encoded<'a>,
+    /// How many more may be held.
+    pub(super) left: usize,
+}
+
+pub(super) enum Encoded<'a> {
     Bytes { bytes: Bytes<'a>, big_endian: bool },
     Text { place: &'a str, words: std::str::SplitAsciiWhitespace<'a> },
 }
 
 impl<'a> Numbers<'a> {
     fn next(&mut self, scalar: &ScalarType, of: &str) -> Result<f64> {
-        match self {
-            Numbers::Bytes { bytes, big_endian } => {
+        match &mut self.from {
+            Encoded::Bytes { bytes, big_endian } => {
                 Ok(number(bytes.take(size(scalar))?, scalar, *big_endian))
             }
-            Numbers::Text { place, words } => {
+            Encoded::Text { place, words } => {
                 let bad = |what: String| Bytes::new(place, &[]).bad(what);
                 let Some(word) = words.next() else {
                     return Err(bad(format!("it ends within its element '{of}'")));
@@ -160,8 +176,22 @@ impl<'a> Numbers<'a> {
         }
     }
 
+    /// The same, for one that is held.
+    fn held(&mut self, scalar: &ScalarType, of: &str) -> Result<f64> {
+        let Some(left) = self.left.checked_sub(1) else {
+            let what = format!("up to its element '{of}' it has too many numbers to be held");
+            let hint = format!("divide it into files of fewer than {MAX_NUMBERS} numbers");
+            return Err(match &self.from {
+                Encoded::Bytes { bytes, .. } => bytes.unsupported(what, hint),
+                Encoded::Text { place, .. } => Bytes::new(place, &[]).unsupported(what, hint),
+            });
+        };
+        self.left = left;
+        self.next(scalar, of)
+    }
+
     /// All rows of an element, where they lie in the file as they are; else one by one.
-    fn element(&mut self, name: String, definition: ElementDef) -> Result<Element<'a>> {
+    pub(super) fn element(&mut self, name: String, definition: ElementDef) -> Result<Element<'a>> {
         let (mut columns, mut lists) = (Vec::new(), Vec::new());
         let mut stride = 0;
         // What stands in a row, in its order: which column or list, and a list's types.
@@ -181,7 +211,7 @@ impl<'a> Numbers<'a> {
         }
         columns.iter_mut().for_each(|c| c.at -= size(&c.scalar));
         let count = definition.count;
-        if let (Numbers::Bytes { bytes, big_endian }, []) = (&mut *self, &lists[..]) {
+        if let (Encoded::Bytes { bytes, big_endian }, []) = (&mut self.from, &lists[..]) {
             let length = count.checked_mul(stride).filter(|length| *length <= bytes.left());
             let Some(length) = length else {
                 let (left, what) = (bytes.left(), format!("{count} rows of {stride} bytes"));
@@ -192,17 +222,16 @@ impl<'a> Numbers<'a> {
             return Ok(Element { name, count, columns, rows });
         }
         columns.iter_mut().enumerate().for_each(|(i, c)| c.at = i);
-        // Each value has a byte at least: no more is held than the file has. Rows of nothing
-        // have none.
+        // Rows of nothing have no bytes: a file may claim any number of them.
         let mut values = Vec::new();
         let rows = if order.is_empty() { 0 } else { count };
         for _ in 0..rows {
             let mut list = lists.iter_mut();
             for (scalar, length) in &order {
                 match length {
-                    None => values.push(self.next(scalar, &name)?),
+                    None => values.push(self.held(scalar, &name)?),
                     Some(length) => {
-                        let many = self.next(length, &name)?;
+                        let many = self.held(length, &name)?;
                         let list = list.next().expect("one for each property");
                         if !(many >= 0.0 && many.fract() == 0.0) {
                             return Err(self
@@ -211,7 +240,7 @@ impl<'a> Numbers<'a> {
                         // Counted as read: a file may claim any number.
                         let mut left = many;
                         while left > 0.0 {
-                            list.values.push(self.next(scalar, &name)?);
+                            list.values.push(self.held(scalar, &name)?);
                             left -= 1.0;
                         }
                         list.ends.push(list.values.len());
@@ -224,62 +253,21 @@ impl<'a> Numbers<'a> {
     }
 
     fn bad(&self, what: String) -> screendoor_trace::error::Error {
-        match self {
-            Numbers::Bytes { bytes, .. } => bytes.bad(what),
-            Numbers::Text { place, .. } => Bytes::new(place, &[]).bad(what),
+        match &self.from {
+            Encoded::Bytes { bytes, .. } => bytes.bad(what),
+            Encoded::Text { place, .. } => Bytes::new(place, &[]).bad(what),
         }
     }
 
     /// Nothing but white space may follow.
-    fn end(&mut self) -> Result<()> {
-        let (more, what) = match self {
-            Numbers::Bytes { bytes, .. } => (bytes.left(), "bytes"),
-            Numbers::Text { words, .. } => (words.count(), "numbers"),
+    pub(super) fn end(&mut self) -> Result<()> {
+        let (more, what) = match &mut self.from {
+            Encoded::Bytes { bytes, .. } => (bytes.left(), "bytes"),
+            Encoded::Text { words, .. } => (words.count(), "numbers"),
         };
         match more {
             0 => Ok(()),
             more => Err(self.bad(format!("it has {more} {what} more than its header says"))),
         }
     }
-}
-
-/// The elements of the PLY file that `content` holds.
-pub(in crate::scene) fn elements<'a>(
-    place: &'a str,
-    content: &'a [u8],
-) -> Result<Vec<Element<'a>>> {
-    let mut reader = Reader::new(&content[..content.len().min(MAX_HEADER)]);
-    let header = Parser::<DefaultElement>::new().read_header(&mut reader);
-    // `reader` has a part of the file only.
-    let read = content.len().min(MAX_HEADER) - reader.get_ref().len();
-    let (_, rows) = content.split_at(read);
-    let whole = Bytes::new(place, content);
-    let header = header.map_err(|e| match e.line() {
-        // The library's own words fill several lines.
-        Some(line) => whole.bad(format_args!("line {line} of its PLY header cannot be read")),
-        None => whole.bad("its PLY header cannot be read"),
-    })?;
-    let mut numbers = match header.encoding {
-        Encoding::Ascii => {
-            let text = std::str::from_utf8(rows);
-            let text = text.map_err(|e| {
-                whole.bad(format_args!("byte {} of it is no text", read + e.valid_up_to()))
-            })?;
-            Numbers::Text { place, words: text.split_ascii_whitespace() }
-        }
-        encoding => Numbers::Bytes {
-            bytes: {
-                let mut bytes = Bytes::new(place, content);
-                bytes.seek(read as u64)?;
-                bytes
-            },
-            big_endian: encoding == Encoding::BinaryBigEndian,
-        },
-    };
-    let elements = header.elements.into_iter();
-    let elements = elements
-        .map(|(name, definition)| numbers.element(name, definition))
-        .collect::<Result<Vec<_>>>()?;
-    numbers.end()?;
-    Ok(elements)
 }

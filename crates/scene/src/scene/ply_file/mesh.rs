@@ -4,20 +4,23 @@ use std::path::Path;
 
 use glam::{DAffine3, DVec3, Vec2, Vec3, Vec4};
 
+use super::content::File;
 use super::{Element, Place};
 use crate::scene::polygon::{Corner, Cutter};
 use crate::scene::{AlphaMode, Material, Mesh, Scene, Shape, far, file_name};
-use screendoor_trace::error::{Error, Result};
+use screendoor_trace::error::{Error, Result, one_line};
 use screendoor_trace::picture::srgb;
 
 /// Names that programs give a face's corners, texture coordinates and colours.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 const UVS: [[&str; 2]; 4] = [["s", "t"], ["u", "v"], ["texture_u", "texture_v"], ["tx", "ty"]];
-const COLOURS: [[&str; 3]; 2] =
-    [["red", "green", "blue"], ["diffuse_red", "diffuse_green", "diffuse_blue"]];
+const COLOURS: [[&str; 3]; 3] =
+    [["red", "green", "blue"], ["diffuse_red", "diffuse_green", "diffuse_blue"], ["r", "g", "b"]];
+const ALPHAS: [&str; 3] = ["alpha", "opacity", "a"];
 
-/// The mesh of a file's elements; `None` where there is no element of faces.
-pub(super) fn scene(path: &Path, elements: &[Element<'_>]) -> Result<Option<Scene>> {
+/// The mesh of a file; `None` where there is no element of faces.
+pub(super) fn scene(path: &Path, file: &File<'_>) -> Result<Option<Scene>> {
+    let File { elements, textures } = file;
     let place = path.display().to_string();
     let find = |name: &str| elements.iter().find(|e| e.name == name);
     if find("tristrips").is_some() {
@@ -30,7 +33,7 @@ pub(super) fn scene(path: &Path, elements: &[Element<'_>]) -> Result<Option<Scen
         let what = format_args!("its faces have no list '{}'", CORNERS.join("' or '"));
         return Err(Error::invalid(&place, what, "export it again"));
     };
-    let Some(positions) = columns(vertices, ["x", "y", "z"]) else {
+    let Ok(positions) = vertices.columns(["x", "y", "z"]) else {
         return Err(Error::invalid(&place, "its vertices lack x, y or z", "export it again"));
     };
     let at = |i: usize| DVec3::from(positions.map(|column| vertices.value(i, column)));
@@ -38,11 +41,12 @@ pub(super) fn scene(path: &Path, elements: &[Element<'_>]) -> Result<Option<Scen
     let own = |i: usize| (at(i) - origin).as_vec3();
     let mut mesh = Mesh { positions: (0..vertices.count).map(own).collect(), ..Mesh::default() };
     let real = |i: usize, column: Place| vertices.value(i, column) as f32;
-    if let Some(normals) = columns(vertices, ["nx", "ny", "nz"]) {
-        let normal = |i| Vec3::from(normals.map(|column| real(i, column)));
-        mesh.normals = (0..vertices.count).map(normal).collect();
+    if let Ok(normals) = vertices.columns(["nx", "ny", "nz"]) {
+        // Exporters write such normals of flat triangles.
+        let normal = |i| Some(Vec3::from(normals.map(|c| real(i, c)))).filter(|n| n.is_finite());
+        mesh.normals = (0..vertices.count).map(|i| normal(i).unwrap_or(Vec3::NAN)).collect();
     }
-    if let Some(uvs) = UVS.into_iter().find_map(|names| columns(vertices, names)) {
+    if let Some(uvs) = UVS.into_iter().find_map(|names| vertices.columns(names).ok()) {
         // PLY's writers count v upwards.
         let uv = |i| Vec2::new(real(i, uvs[0]), 1.0 - real(i, uvs[1]));
         mesh.uvs = (0..vertices.count).map(uv).collect();
@@ -69,10 +73,10 @@ pub(super) fn scene(path: &Path, elements: &[Element<'_>]) -> Result<Option<Scen
         points.extend(polygon.iter().map(|i| at(*i)));
         let triangles = cutter.triangulate(&points).map_err(|_| {
             let what = format!(
-                "a face of {} corners that is not convex or crosses itself too often",
+                "a face of {} corners that is not convex or, with those before, takes too long to cut",
                 list.len()
             );
-            let hint = "divide it into polygons of fewer than 65536 corners";
+            let hint = "divide it into polygons of fewer corners";
             Error::unsupported(format!("{place}, face {face}"), what, hint)
         })?;
         for triangle in triangles {
@@ -87,6 +91,7 @@ pub(super) fn scene(path: &Path, elements: &[Element<'_>]) -> Result<Option<Scen
             mesh.triangles.push(triangle);
         }
     }
+    mesh.fill_normals();
     let see_through = mesh.colours.iter().any(|c| c.w < 1.0);
     let mut scene = Scene {
         source: file_name(path),
@@ -103,8 +108,17 @@ pub(super) fn scene(path: &Path, elements: &[Element<'_>]) -> Result<Option<Scen
         let what = format!("{place}: {few} faces of fewer than three corners are not drawn");
         scene.warnings.push(what);
     }
-    if COLOURS.iter().any(|names| columns(faces, *names).is_some()) {
+    if COLOURS.iter().any(|names| faces.columns(*names).is_ok()) {
         let what = "its faces' own colours are not read; vertices' are";
+        scene.warnings.push(format!("{place}: {what}"));
+    }
+    for list in faces.lists().iter().filter(|list| !CORNERS.contains(&list.name.as_str())) {
+        let name = one_line(&list.name);
+        let what = format!("what its faces say as '{name}' is not read; what vertices say is");
+        scene.warnings.push(format!("{place}: {what}"));
+    }
+    for name in textures {
+        let what = format!("its texture '{}' is not read: give it to the capture", one_line(name));
         scene.warnings.push(format!("{place}: {what}"));
     }
     scene.add("mesh", Shape::Mesh(mesh));
@@ -112,17 +126,11 @@ pub(super) fn scene(path: &Path, elements: &[Element<'_>]) -> Result<Option<Scen
     Ok(Some(scene))
 }
 
-/// The properties of these names, where all are there.
-fn columns<const N: usize>(of: &Element<'_>, names: [&str; N]) -> Option<[Place; N]> {
-    let found = names.map(|name| of.column(name));
-    found.iter().all(Option::is_some).then(|| found.map(|c| c.expect("all are there")))
-}
-
 /// Linear colours and alphas; empty where there are none. Whole numbers are shares of the
 /// greatest that their type holds, encoded as in pictures.
 fn colours(vertices: &Element<'_>, mut warn: impl FnMut(&str)) -> Vec<Vec4> {
-    let rgb = COLOURS.into_iter().find_map(|names| columns(vertices, names));
-    let alpha = vertices.column("alpha");
+    let rgb = COLOURS.into_iter().find_map(|names| vertices.columns(names).ok());
+    let alpha = ALPHAS.into_iter().find_map(|name| vertices.column(name));
     if rgb.is_none() && alpha.is_none() {
         return Vec::new();
     }

@@ -1,11 +1,12 @@
 //! PLY files: Gaussian splats as they are trained or as PlayCanvas compresses them, or a mesh.
 
+mod content;
 mod elements;
 mod mesh;
 
 use std::path::Path;
 
-use self::elements::elements;
+use self::content::File;
 pub(super) use self::elements::{Element, Place};
 use crate::scene::bytes::Bytes;
 use crate::scene::{Axes, Scene, file, splat_file};
@@ -15,14 +16,19 @@ use screendoor_trace::error::Result;
 pub(super) fn load(path: &Path) -> Result<Scene> {
     let content = file::read(path)?;
     let place = path.display().to_string();
-    let elements = elements(&place, &content)?;
-    if let Some(cloud) = splat_file::compressed(&place, &elements)? {
+    let file = File::read(&place, &content)?;
+    let splats = match splat_file::compressed(&place, &file.elements)? {
+        None => splat_file::trained(&place, &file.elements)?,
+        packed => packed,
+    };
+    if let Some(mut cloud) = splats {
+        let faces = file.elements.iter().find(|e| e.name == "face").map_or(0, |e| e.count);
+        if faces > 0 {
+            cloud.tell(&format!("its {faces} faces are not drawn beside its splats"));
+        }
         return cloud.scene(path, Axes::YDown);
     }
-    if let Some(cloud) = splat_file::trained(&place, &elements)? {
-        return cloud.scene(path, Axes::YDown);
-    }
-    if let Some(scene) = mesh::scene(path, &elements)? {
+    if let Some(scene) = mesh::scene(path, &file)? {
         return Ok(scene);
     }
     Err(Bytes::new(&place, &content).unsupported(

@@ -55,7 +55,8 @@ pub(super) struct Cloud {
 }
 
 impl Cloud {
-    fn tell(&mut self, what: &str) {
+    /// Notes something of the file that is not read.
+    pub(super) fn tell(&mut self, what: &str) {
         self.told.push(format!("{}: {what}", self.place));
     }
 
@@ -101,22 +102,27 @@ impl Cloud {
         }
     }
 
-    /// The splats, how many of them are broken, and what is not read.
-    pub(super) fn finish(self) -> (Splats, usize, Vec<String>) {
-        (self.splats, self.broken, self.told)
+    /// The splats, and what of them is not read or shows nothing.
+    pub(super) fn finish(mut self) -> (Splats, Vec<String>) {
+        if self.broken > 0 {
+            let what = "have no finite place, size, turn, opacity or colour and show nothing";
+            self.tell(&format!("{} splats {what}", self.broken));
+        }
+        (self.splats, self.told)
     }
 
     /// The scene of them, whose format has these axes by habit.
     pub(super) fn scene(self, path: &Path, axes: Axes) -> Result<Scene> {
-        let Cloud { place, splats, broken, told } = self;
-        if splats.means.is_empty() {
+        let (place, broken) = (&self.place, self.broken);
+        if self.splats.means.is_empty() {
             return Err(Error::invalid(place, "it has no splats", "give a file with some"));
         }
-        if broken == splats.means.len() {
+        if broken == self.splats.means.len() {
             let what =
                 format_args!("none of its {broken} splats has a finite place, size and turn");
             return Err(Error::invalid(place, what, "export it again"));
         }
+        let (splats, warnings) = self.finish();
         let mut scene = Scene {
             source: file_name(path),
             files: vec![path.to_path_buf()],
@@ -124,13 +130,9 @@ impl Cloud {
             // Which side is the front, no file says.
             view: View { yaw: -30.0, pitch: 10.0, ..View::default() },
             axes,
-            warnings: told,
+            warnings,
             ..Scene::default()
         };
-        if broken > 0 {
-            let what = "have no finite place, size, turn, opacity or colour and show nothing";
-            scene.warnings.push(format!("{place}: {broken} splats {what}"));
-        }
         scene.add("splats", Shape::Splats(splats));
         Ok(scene)
     }

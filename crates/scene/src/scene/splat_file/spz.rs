@@ -4,9 +4,9 @@
 //!
 //! The format: `nianticlabs/spz`, `load-spz.cc`.
 
-use std::io::Read;
+use std::io::{self, Read};
 
-use flate2::read::GzDecoder;
+use flate2::bufread::GzDecoder;
 use half::f16;
 use zstd::stream::read::Decoder;
 
@@ -20,6 +20,8 @@ const GZIP: &[u8] = &[0x1f, 0x8b];
 const COLOUR_SCALE: f64 = 0.15;
 /// The most splats that are read.
 const MAX_SPLATS: usize = 1 << 26;
+/// The most bytes of extension records, which are skipped.
+const MAX_EXTENSIONS: u64 = 1 << 26;
 /// Flags of the header.
 const ANTIALIASED: u8 = 1;
 const EXTENDED: u8 = 2;
@@ -106,9 +108,18 @@ pub(in crate::scene) fn cloud(place: &str, content: &[u8]) -> Result<Cloud> {
         return Err(file.bad(what));
     }
     // Extension records follow, if the header says so; nothing else does.
-    let more = unpacked.read(&mut [0]).map_err(fail)?;
+    let more = io::copy(&mut unpacked.by_ref().take(MAX_EXTENSIONS + 1), &mut io::sink());
+    let more = more.map_err(fail)?;
     if more > 0 && head.flags & EXTENDED == 0 {
         return Err(file.bad("it goes on after its last array"));
+    }
+    if more > MAX_EXTENSIONS {
+        let what = "its extension records take more than 64 MiB";
+        return Err(file.unsupported(what, "save it without them"));
+    }
+    let after = unpacked.into_inner().len();
+    if after > 0 {
+        return Err(file.bad(format_args!("it has {after} bytes after its gzip stream")));
     }
     let mut rest = &body[..];
     let arrays = head.sizes().map(|size| {

@@ -40,14 +40,10 @@ pub(in crate::scene) fn trained(place: &str, elements: &[Element<'_>]) -> Result
 }
 
 fn columns<const N: usize>(place: &str, of: &Element<'_>, names: [&str; N]) -> Result<[Place; N]> {
-    let found = names.map(|name| of.column(name));
-    match found.iter().position(Option::is_none) {
-        None => Ok(found.map(|c| c.expect("all are there"))),
-        Some(missing) => {
-            let what = format_args!("its splats have no property '{}'", names[missing]);
-            Err(Error::invalid(place, what, "export it again"))
-        }
-    }
+    of.columns(names).map_err(|missing| {
+        let what = format_args!("its splats have no property '{missing}'");
+        Error::invalid(place, what, "export it again")
+    })
 }
 
 /// The degree of the harmonics of an element and the properties of those after the constant.

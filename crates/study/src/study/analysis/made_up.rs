@@ -99,6 +99,7 @@ fn facts(name: &str, place: usize) -> SceneFacts {
         source: format!("builtin:{name}"),
         camera: "angle 0, 0; distance 3; field of view 45".into(),
         view: None,
+        space: Default::default(),
         warnings: Vec::new(),
         pixel: [256, 256],
         statistics,

@@ -34,7 +34,7 @@ impl Trial {
         let first = study.scenes.first();
         Trial {
             samples: study.samples.first().copied().unwrap_or_default(),
-            side: first.map_or(0, |scene| scene.size[0]),
+            side: first.map_or(0, |scene| scene.frame()[0]),
             seeds: study.seeds,
             antialiased: first.is_some_and(|scene| scene.pattern != PatternKind::Centre),
             scenes: found.scenes(SceneEntry::title),

@@ -100,7 +100,7 @@ impl Study {
         let Frames { side, captured, pattern, seeds } = frames;
         self.seeds = seeds;
         for scene in &mut self.scenes {
-            scene.size = [side, side];
+            scene.size = Some([side, side]);
             scene.captured_samples = captured;
             scene.pattern = pattern;
         }

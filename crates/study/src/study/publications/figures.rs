@@ -132,5 +132,5 @@ pub(super) fn figures(effort: Effort) -> Result<(Vec<NamedPicture>, FigureNoise)
 fn built_in(source: &str, effort: Effort) -> Result<Trace> {
     let study = study_of(effort)?;
     let entry = study.scenes.iter().find(|s| s.drawn() == source).expect("it is in the table");
-    capture(source, &entry.options(Path::new(""), &[])?, entry.white)
+    capture(source, &entry.options(entry.camera_choice(Path::new("")).choose(&[])?)?, entry.white)
 }

@@ -61,7 +61,7 @@ pub(super) fn means(lab: &Lab<'_>, effort: Effort) -> Result<Vec<MeanError>> {
         for run in results.records {
             let entry = results.study.scenes.iter().find(|scene| scene.name == run.scene);
             let Some(entry) = entry else { continue };
-            list.push(MeanError { scene: entry.title(), side: entry.size[0], run });
+            list.push(MeanError { scene: entry.title(), side: entry.frame()[0], run });
         }
     }
     Ok(list)

@@ -154,14 +154,14 @@ fn variations(base: &SceneEntry) -> Vec<Way> {
     let mut add = |aspect, what: &str, entry| {
         list.push(Way { aspect, what: what.to_string(), entry });
     };
-    let side = base.size[0];
+    let side = base.frame()[0];
     add(Aspect::Nothing(base.order), &format!("{side}×{side} pixels, its order"), base.clone());
     for yaw in [120.0, 210.0, 300.0] {
         let angle = Some([yaw, 20.0]);
         add(Aspect::Angle, &format!("from {yaw}°"), SceneEntry { angle, ..base.clone() });
     }
     for side in [side * 2, side / 2] {
-        let entry = SceneEntry { size: [side, side], ..base.clone() };
+        let entry = SceneEntry { size: Some([side, side]), ..base.clone() };
         add(Aspect::Size(side), &format!("{side}×{side} pixels"), entry);
     }
     for (what, order) in [

@@ -11,8 +11,8 @@ use screendoor_trace::error::{Error, Result};
 use screendoor_trace::trace::Trace;
 
 /// Finds out what would keep the runs of a part from being done that are not in `folder` yet:
-/// scenes that are not there or have no such name or parameters, textures and traces that
-/// cannot be read, traces that do not serve the sample counts or have no view where a design
+/// scenes that are not there or have no such name or parameters, textures, files of cameras and
+/// traces that cannot be read, traces that do not serve the sample counts or have no view where a design
 /// asks for it, and engines that this machine has not. Nothing is written.
 ///
 /// # Errors
@@ -98,14 +98,7 @@ fn check_scene(entry: &SceneEntry, folder: &Path, base: &Path, jobs: &[&Job]) ->
         let trace = Trace::open(base.join(trace))?;
         let header = trace.header();
         jobs.iter().try_for_each(|job| header.pattern.prefix(job.samples).map(|_| ()))?;
-        return match entry.pixel {
-            Some([x, y]) if u32::from(x) >= header.width || u32::from(y) >= header.height => {
-                let (w, h) = (header.width, header.height);
-                let what = format_args!("pixel {x}, {y} lies outside the trace's {w} x {h}");
-                Err(Error::config(what, "name one within"))
-            }
-            _ => Ok(()),
-        };
+        return entry.check_pixel([header.width, header.height]);
     }
     // What has been drawn is not drawn again.
     if trace_path(folder, &entry.name).exists() {
@@ -121,5 +114,10 @@ fn check_scene(entry: &SceneEntry, folder: &Path, base: &Path, jobs: &[&Job]) ->
             return Err(Error::invalid(path.display(), what, "give a PNG or JPEG"));
         }
     }
-    Ok(())
+    // Cameras of the scene's own file are known when it is loaded.
+    let choice = entry.camera_choice(base);
+    match choice.file() {
+        Some(_) => entry.check_pixel(choice.choose(&[])?.size),
+        None => Ok(()),
+    }
 }

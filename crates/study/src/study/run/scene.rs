@@ -7,7 +7,8 @@ use crate::study::measure::Subject;
 use crate::study::results::SceneFacts;
 use crate::study::run::store::Store;
 use screendoor_designs::REFERENCE;
-use screendoor_scene::capture::Capture;
+use screendoor_scene::capture::{Capture, CaptureOptions};
+use screendoor_scene::scene::Scene;
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::output::OutputFile;
 use screendoor_trace::tile::{TILE_PIXELS, TileGrid, TileMap};
@@ -49,7 +50,9 @@ impl OpenScene {
         let warnings = || match warnings {
             Some(warnings) => Ok(warnings),
             // Drawn by a process that ended before it could say so.
-            None if entry.source.is_some() => Ok(entry.load(base)?.warnings),
+            None if entry.source.is_some() => {
+                prepared(entry, base).map(|(scene, _)| scene.warnings)
+            }
             None => Ok(Vec::new()),
         };
         let facts = facts(store, index, &trace, shown, warnings, watch)?;
@@ -62,8 +65,8 @@ impl OpenScene {
     }
 }
 
-/// Draws a scene into the trace at `path`. Returns what of it is not drawn.
-fn draw(entry: &SceneEntry, base: &Path, path: &Path) -> Result<Vec<String>> {
+/// A scene as it is drawn, how, and in its warnings what of either is not honoured.
+fn prepared(entry: &SceneEntry, base: &Path) -> Result<(Scene, CaptureOptions)> {
     let mut scene = entry.load(base)?;
     if let Some(texture) = &entry.texture {
         scene.apply_texture(&base.join(texture))?;
@@ -71,8 +74,16 @@ fn draw(entry: &SceneEntry, base: &Path, path: &Path) -> Result<Vec<String>> {
     if entry.white {
         scene.whiten();
     }
-    scene.warnings.extend(entry.camera_warnings(base)?);
-    let options = entry.options(base, &scene.cameras)?;
+    let mut chosen = entry.camera_choice(base).choose(&scene.cameras)?;
+    scene.warnings.append(&mut chosen.warnings);
+    let options = entry.options(chosen)?;
+    scene.warnings.extend(options.unused(&scene));
+    Ok((scene, options))
+}
+
+/// Draws a scene into the trace at `path`. Returns what of it is not drawn.
+fn draw(entry: &SceneEntry, base: &Path, path: &Path) -> Result<Vec<String>> {
+    let (mut scene, options) = prepared(entry, base)?;
     let capture = Capture::new(&scene, &options)?;
     let file = OutputFile::create(path)?;
     let place = path.display().to_string();
@@ -124,6 +135,7 @@ fn facts(
         source: header.source.clone(),
         camera: header.camera.clone(),
         view,
+        space: header.space,
         warnings: warnings()?,
         pixel: match entry.pixel {
             Some(pixel) => pixel,

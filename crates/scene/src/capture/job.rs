@@ -1,0 +1,170 @@
+//! The drawing of a chunk of primitives, cut into jobs that threads do.
+
+use crate::capture::geometry::{Splat, Triangle};
+use crate::capture::raster::Raster;
+use crate::capture::setup::ScreenTriangle;
+use crate::capture::shade::Shader;
+use crate::capture::splat::{Nothing, OnFrame, Painter, Placed, SplatRules};
+use screendoor_trace::trace::Fragment;
+
+/// Pixels of bounding boxes that one job rasterises.
+const JOB_PIXELS: i64 = 1 << 13;
+/// Pixels of bounding boxes that are in flight at a time.
+const WAVE_PIXELS: i64 = 1 << 19;
+
+/// What a capture draws with.
+pub(super) struct Tools<'a> {
+    pub(super) shader: Shader<'a>,
+    pub(super) painter: Painter<'a>,
+    /// Each object's place, for its splats.
+    pub(super) placed: Vec<Placed>,
+    pub(super) rules: &'a SplatRules,
+    /// The samples' places from the pixel's centre, in sub-pixel steps and in pixels.
+    pub(super) steps: Vec<[i64; 2]>,
+    pub(super) pixels: Vec<[f64; 2]>,
+    /// The frame's, in pixels.
+    pub(super) size: [u32; 2],
+}
+
+impl Tools<'_> {
+    pub(super) fn project(&self, splat: &Splat<'_>) -> std::result::Result<OnFrame, Nothing> {
+        self.painter.project(splat.splats, splat.index, &self.placed[splat.object as usize])
+    }
+
+    pub(super) fn raster<'p>(&'p self, piece: &'p ScreenTriangle) -> Raster<'p> {
+        Raster::new(piece, &self.steps, self.size)
+    }
+}
+
+/// A primitive and what is left of it on the frame.
+pub(super) enum Drawn {
+    Triangle {
+        triangle: Triangle,
+        /// What clipping left of it.
+        pieces: Vec<ScreenTriangle>,
+    },
+    Splat {
+        on_frame: std::result::Result<OnFrame, Nothing>,
+        object: u32,
+        primitive: u32,
+    },
+}
+
+/// The rows that something may touch, empty where they cross, and the pixels of each.
+struct Extent {
+    rows: (i64, i64),
+    columns: i64,
+}
+
+impl Drawn {
+    /// The extent of each piece.
+    fn extents(&self, tools: &Tools<'_>) -> Vec<Extent> {
+        match self {
+            Drawn::Triangle { pieces, .. } => {
+                let extent = |piece| {
+                    let raster = tools.raster(piece);
+                    Extent { rows: raster.rows(), columns: raster.columns() }
+                };
+                pieces.iter().map(extent).collect()
+            }
+            Drawn::Splat { on_frame, .. } => {
+                let extent = |s: &OnFrame| Extent { rows: s.rows(), columns: s.columns() };
+                on_frame.iter().map(extent).collect()
+            }
+        }
+    }
+
+    /// Its fragments in some rows of a piece.
+    fn fragments(&self, part: &Part, tools: &Tools<'_>, fragments: &mut Vec<Fragment>) {
+        match self {
+            Drawn::Triangle { triangle, pieces } => {
+                let raster = tools.raster(&pieces[part.piece]);
+                for y in part.rows.0..=part.rows.1 {
+                    raster.row(y, |hit| {
+                        let weights = raster.weights(hit.shade_at);
+                        let shaded = tools.shader.shade(triangle, &weights);
+                        let Some((colour, alpha)) = shaded else { return };
+                        fragments.push(Fragment {
+                            x: hit.x,
+                            y: hit.y,
+                            coverage: hit.coverage,
+                            depth: hit.depth,
+                            colour,
+                            alpha,
+                            primitive: triangle.primitive,
+                            object: triangle.object,
+                            ..Fragment::default()
+                        });
+                    });
+                }
+            }
+            Drawn::Splat { on_frame, object, primitive } => {
+                let Ok(splat) = on_frame else { return };
+                let (object, primitive) = (*object, *primitive);
+                let of = Fragment { object, primitive, ..Fragment::default() };
+                for y in part.rows.0..=part.rows.1 {
+                    let push = |fragment| fragments.push(fragment);
+                    splat.row(y, tools.rules, &tools.pixels, of, push);
+                }
+            }
+        }
+    }
+}
+
+/// A part of the drawing that one thread does: some rows of one piece after the
+/// other.
+#[derive(Default)]
+pub(super) struct Job {
+    parts: Vec<Part>,
+    pixels: i64,
+}
+
+/// Rows of a piece of a primitive, by their places in the chunk.
+struct Part {
+    drawn: usize,
+    piece: usize,
+    rows: (i64, i64),
+}
+
+/// Cuts the drawing of a chunk into jobs of about equal size, in drawing order.
+/// The cuts depend on the primitives alone, not on the threads.
+pub(super) fn cut_into_jobs(drawn: &[Drawn], tools: &Tools<'_>) -> Vec<Job> {
+    let mut jobs = vec![Job::default()];
+    for (i, d) in drawn.iter().enumerate() {
+        for (k, extent) in d.extents(tools).into_iter().enumerate() {
+            let (mut row, last) = extent.rows;
+            let columns = extent.columns;
+            while row <= last {
+                let mut job = jobs.last_mut().expect("never empty");
+                if job.pixels >= JOB_PIXELS {
+                    jobs.push(Job::default());
+                    job = jobs.last_mut().expect("just pushed");
+                }
+                let room = ((JOB_PIXELS - job.pixels) / columns).max(1);
+                let end = (row + room - 1).min(last);
+                job.parts.push(Part { drawn: i, piece: k, rows: (row, end) });
+                job.pixels += (end - row + 1) * columns;
+                row = end + 1;
+            }
+        }
+    }
+    jobs
+}
+
+/// How many of `jobs` make up a wave.
+pub(super) fn wave_length(jobs: &[Job]) -> usize {
+    let mut pixels = 0;
+    let full = jobs.iter().position(|job| {
+        pixels += job.pixels;
+        pixels >= WAVE_PIXELS
+    });
+    full.map_or(jobs.len(), |last| last + 1)
+}
+
+impl Job {
+    pub(super) fn run(&self, drawn: &[Drawn], tools: &Tools<'_>) -> Vec<Fragment> {
+        let mut fragments = Vec::new();
+        self.parts.iter().for_each(|part| drawn[part.drawn].fragments(part, tools, &mut fragments));
+        fragments
+    }
+}
