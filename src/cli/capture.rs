@@ -98,6 +98,10 @@ pub(super) struct Arguments {
     /// and in trained splats -y
     #[arg(long, value_parser = option::<Axes>())]
     axes: Option<Axes>,
+    /// How wide lines of OBJ and glTF files are drawn, in the scene's units; where not given, lines
+    /// beside surfaces are left out, and others are as wide as suits their extent
+    #[arg(long, value_name = "WIDTH", allow_negative_numbers = true)]
+    line_width: Option<f64>,
     /// What colours stand for, and so in what designs blend them: 'encoded' for splats, which
     /// are trained so, and else 'linear', where not given
     #[arg(long, value_parser = option::<Space>())]
@@ -179,6 +183,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         grid: arguments.grid.clone(),
         allow_outside: arguments.allow_outside,
         axes: arguments.axes,
+        line_width: arguments.line_width,
     };
     let mut scene = scene::load_with(source, &load)?;
     drop(loading);

@@ -68,7 +68,7 @@ fn lines_that_cannot_be_are_refused() {
         assert!(refused(CURVES, Some(width)).contains("give a width above 0"));
     }
     let face = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
-    assert!(refused(face, Some(1.0)).contains("leave --line-width out"));
+    assert!(refused(face, Some(1.0)).contains("leave the line width out"));
 }
 
 #[test]

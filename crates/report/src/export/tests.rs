@@ -219,6 +219,7 @@ fn whole_scene(small: &SceneEntry) -> SceneEntry {
         camera_name: Some(String::new()),
         splat_rules: Some(String::new()),
         axes: Some(Default::default()),
+        line_width: Some(1.0),
         space: Some(Default::default()),
         background: Some([0.0; 3]),
         pixel: Some([0; 2]),

@@ -56,13 +56,13 @@ impl Scene {
                 self.objects = objects.into_iter().filter(|o| lines(self, o) == 0).collect();
                 let source = &self.source;
                 self.warnings.push(format!(
-                    "{source}: {count} lines beside surfaces are not drawn; --line-width draws them"
+                    "{source}: {count} lines beside surfaces are not drawn; a line width draws them"
                 ));
             } else if count > 0 {
                 let source = &self.source;
                 self.warnings.push(format!(
                     "{source}: it does not say how wide its {count} lines are, which are taken \
-                     for {SHARE} of their extent; --line-width says it"
+                     for {SHARE} of their extent; a line width says it"
                 ));
             }
             for shape in &mut self.shapes {
@@ -80,7 +80,7 @@ impl Scene {
         }
         if count == 0 {
             let what = format_args!("'{}' has no lines", self.source);
-            return Err(Error::config(what, "leave --line-width out"));
+            return Err(Error::config(what, "leave the line width out"));
         }
         // A shape may stand in several places, each of its own size.
         let places: Vec<(usize, f64)> = self

@@ -162,6 +162,9 @@ pub struct SceneEntry {
     /// Which way is up in a file that does not say.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub axes: Option<Axes>,
+    /// How wide lines of OBJ and glTF files are drawn, in the scene's units.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub line_width: Option<f64>,
     /// What colours stand for, and so in what designs blend them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub space: Option<Space>,
@@ -363,7 +366,8 @@ impl SceneEntry {
     /// As [`scene::load_with`].
     pub fn load(&self, base: &Path) -> Result<Scene> {
         let source = self.source.as_deref().unwrap_or("");
-        let options = LoadOptions { axes: self.axes, ..LoadOptions::default() };
+        let options =
+            LoadOptions { axes: self.axes, line_width: self.line_width, ..LoadOptions::default() };
         scene::load_with(&scene::seen_from(source, base), &options)
     }
 

@@ -191,7 +191,7 @@ mod tests {
                 let key = |i: u64| {
                     let fragment = Fragment { primitive: i as u32, ..Fragment::default() };
                     // Rows on both sides of 2^32.
-                    shuffle.key(i + (i % 2 << 32), &fragment)
+                    shuffle.key(i + ((i % 2) << 32), &fragment)
                 };
                 let mut keys: Vec<u64> = (0..100_000).map(key).collect();
                 assert!(!keys.is_sorted());

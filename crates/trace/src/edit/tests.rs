@@ -360,7 +360,8 @@ fn the_first_difference_is_found_in_every_column() {
     let all = made_up(&header, 3000);
     let trace_a = trace(&header, &all);
     assert_eq!(compared(&trace_a, &trace_a).same, Kept::Rows);
-    let changed: [(&str, fn(&mut Fragment), f64); 8] = [
+    type Change = (&'static str, fn(&mut Fragment), f64);
+    let changed: [Change; 8] = [
         ("coverage", |f| f.coverage = SampleMask(f.coverage.0 ^ 0b11), 2.0),
         ("z", |f| f.depth.z = Unorm32(f.depth.z.0 ^ 1), 1.0),
         ("dzdx", |f| f.depth.dzdx += 9, 9.0),

@@ -252,9 +252,8 @@ impl Loader<'_> {
         mode: Mode,
         unit: &'static str,
     ) -> Option<Matter> {
-        match mode {
-            Mode::Points => return Some(self.warnings.matter_of(unit, "points are not drawn")),
-            _ => {}
+        if mode == Mode::Points {
+            return Some(self.warnings.matter_of(unit, "points are not drawn"));
         }
         let position = primitive.attributes.get("POSITION");
         let packed = "KHR_draco_mesh_compression";
