@@ -70,6 +70,7 @@ static VkDeviceMemory memory(VkMemoryRequirements needs, VkMemoryPropertyFlags w
         const bool fits = needs.memoryTypeBits >> info.memoryTypeIndex & 1;
         if (fits && (type.propertyFlags & wanted) == wanted) break;
     }
+    if (info.memoryTypeIndex == all.memoryTypeCount) fail("there is no memory of that type");
     VkDeviceMemory found;
     check(vkAllocateMemory(device, &info, NULL, &found), "there is not enough memory");
     return found;
@@ -326,9 +327,14 @@ int main(int argc, char **argv) {
     screendoor_header header = {0};
     header.width = WIDTH, header.height = HEIGHT, header.samples = SAMPLES;
     header.source = "triangles by Vulkan", header.camera = "clip space";
+    /* A copy: it is sorted, and memory that devices write to is slow to work in. */
+    const size_t length = count * sizeof(screendoor_raw_fragment);
+    screendoor_raw_fragment *raw = (screendoor_raw_fragment *)malloc(length + 1);
+    if (!raw) fail("there is not enough memory");
+    memcpy(raw, (const char *)fragments.data + 4, length);
     screendoor_trace *trace = screendoor_trace_open(argv[3], &header);
-    screendoor_trace_push_raw(
-        trace, (screendoor_raw_fragment *)((char *)fragments.data + 4), count);
+    screendoor_trace_push_raw(trace, raw, count);
+    free(raw);
     if (!screendoor_trace_close(trace)) fail(screendoor_trace_error(trace));
     screendoor_trace_free(trace);
     printf("%s: %u fragments\n", argv[3], count);

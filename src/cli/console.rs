@@ -14,6 +14,7 @@ use crate::error::{Error, Result};
 pub(super) struct Console {
     quiet: bool,
     failed: Cell<bool>,
+    differs: Cell<bool>,
 }
 
 const TO_OUTPUT: &str = "write to";
@@ -26,7 +27,7 @@ pub(super) fn nobody_reads(error: &Error) -> bool {
 
 impl Console {
     pub fn new(quiet: bool) -> Self {
-        Console { quiet, failed: Cell::new(false) }
+        Console { quiet, failed: Cell::new(false), differs: Cell::new(false) }
     }
 
     /// Prints text to standard output, and a line's end. Of control characters
@@ -44,17 +45,22 @@ impl Console {
 
     /// Prints an error to standard error; the program will end with a failure.
     pub fn error(&self, error: &Error) {
-        self.fail();
+        self.failed.set(true);
         // Where standard error is closed there is nobody to tell.
         let _ = writeln!(io::stderr().lock(), "screendoor: error: {}", shown(error));
     }
 
-    /// The program will end with a failure, of which all is said.
-    pub fn fail(&self) {
-        self.failed.set(true);
+    /// The program will say by how it ends that two things differ.
+    pub fn differ(&self) {
+        self.differs.set(true);
     }
 
-    /// Whether an error has been printed, or there was another failure.
+    /// Whether it will.
+    pub fn has_differed(&self) -> bool {
+        self.differs.get()
+    }
+
+    /// Whether an error has been printed.
     pub fn has_failed(&self) -> bool {
         self.failed.get()
     }

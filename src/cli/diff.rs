@@ -13,7 +13,7 @@ use crate::edit::{
 use crate::error::Result;
 use crate::trace::{ColumnId, ColumnKind, Scalar, Trace};
 
-/// Compare two traces fragment by fragment; ends with 1 where a replay can tell them apart
+/// Compare two traces fragment by fragment; ends with 3 where a replay can tell them apart
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// A trace
@@ -59,7 +59,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     };
     report(json, "screendoor.diff", &document, console, || print(&document, console))?;
     if !document.same {
-        console.fail();
+        console.differ();
     }
     Ok(())
 }
@@ -100,9 +100,11 @@ fn print(document: &Document, console: &Console) -> Result<()> {
             format!("differs in {fragments} fragments, by {most}{unit} at most"),
         )?;
     }
-    if found.compared > 0 && found.compared < found.pixels {
-        let compared = grouped(found.compared);
-        line("", format!("(columns of the first {compared} pixels that have as many fragments)"))?;
+    let comparable = found.pixels - found.counts;
+    if found.compared < comparable {
+        let [compared, all] = [found.compared, comparable].map(grouped);
+        let which = "pixels that have as many fragments in both: more need more --memory";
+        line("", format!("(columns of {compared} of the {all} {which})"))?;
     }
     console.print(format_args!(
         "{}",

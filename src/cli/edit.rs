@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use crate::cli::arguments::{option, samples, size};
 use crate::cli::console::{Console, grouped, shown};
-use crate::cli::files::{JsonArgument, check, open_trace, report};
+use crate::cli::files::{Json, JsonArgument, check, open_trace, report};
 use crate::cli::kind::{Kind, check_output};
 use crate::cli::signals::on_interrupt;
 use crate::edit::{
@@ -49,9 +49,9 @@ pub(super) struct TrimArguments {
     /// A rectangle of pixels from column X and row Y on: the new frame
     #[arg(long, value_name = "X,Y,WxH", value_parser = area)]
     area: Option<Area>,
-    /// Leave the frame as large as it is: designs draw randomness from a fragment's pixel, so
+    /// Leave the frame as large as it is, with --area: designs draw randomness from a fragment's pixel, so
     /// that the part looks as it did in the whole
-    #[arg(long)]
+    #[arg(long, requires = "area")]
     keep_frame: bool,
     /// The first N samples of each pixel
     #[arg(long, value_name = "N", value_parser = samples, allow_negative_numbers = true)]
@@ -105,7 +105,7 @@ struct Target {
     /// The trace to write
     #[arg(long, short, value_name = "TRACE")]
     output: PathBuf,
-    /// How its columns are stored
+    /// How its columns are stored, however they were before
     #[arg(long, default_value = "none", value_parser = option::<Compression>())]
     compress: Compression,
     #[command(flatten)]
@@ -129,7 +129,7 @@ struct Document<'a> {
 }
 
 pub(super) fn run_convert(arguments: &ConvertArguments, console: &Console) -> Result<()> {
-    let traces = arguments.target.begin(&[&arguments.trace], console)?;
+    let begun = arguments.target.begin(&[&arguments.trace], console)?;
     let options = ConvertOptions {
         colour: match (arguments.half_colour, arguments.float_colour) {
             (true, _) => Some(ColourFormat::F16),
@@ -140,6 +140,7 @@ pub(super) fn run_convert(arguments: &ConvertArguments, console: &Console) -> Re
     };
     let progress = console.progress("looking at columns", "fragments");
     let told = &mut |done, of| progress.set(done, of);
+    let traces = begun.traces.clone();
     let convert = Convert::new(&traces[0], options, told)?;
     let rounded = convert.rounded(told)?;
     drop(progress);
@@ -147,38 +148,55 @@ pub(super) fn run_convert(arguments: &ConvertArguments, console: &Console) -> Re
         let rounded = grouped(rounded);
         console.warn(&format!("half precision rounds the colours of {rounded} fragments"));
     }
-    arguments.target.save(&convert, &traces, rounded, console)
+    begun.save(&convert, rounded, console)
 }
 
 pub(super) fn run_trim(arguments: &TrimArguments, console: &Console) -> Result<()> {
-    let traces = arguments.target.begin(&[&arguments.trace], console)?;
     let TrimArguments { area, keep_frame, samples, .. } = *arguments;
     let (rows, primitives) = (arguments.rows.clone(), arguments.primitives.clone());
     let objects = arguments.objects.clone();
     let options = TrimOptions { area, keep_frame, samples, rows, primitives, objects };
-    arguments.target.save(&Trim::new(&traces[0], options)?, &traces, 0, console)
+    if options.is_all() {
+        return Err(Error::config(
+            "it is not said which part of the trace is kept",
+            "give --area, --samples, --rows, --primitives or --objects",
+        ));
+    }
+    let begun = arguments.target.begin(&[&arguments.trace], console)?;
+    let traces = begun.traces.clone();
+    begun.save(&Trim::new(&traces[0], options)?, 0, console)
 }
 
 pub(super) fn run_join(arguments: &JoinArguments, console: &Console) -> Result<()> {
     let inputs: Vec<&Path> = arguments.traces.iter().map(|path| &**path).collect();
-    let traces = arguments.target.begin(&inputs, console)?;
+    let begun = arguments.target.begin(&inputs, console)?;
+    let traces = begun.traces.clone();
     let merge = Merge::new(&traces, MergeOptions { keep_numbers: arguments.keep_numbers })?;
     if merge.lost_view() {
         console.warn("the traces do not have one view, so the new one has none");
     }
-    arguments.target.save(&merge, &traces, 0, console)
+    begun.save(&merge, 0, console)
 }
 
 pub(super) fn run_shuffle(arguments: &ShuffleArguments, console: &Console) -> Result<()> {
-    let traces = arguments.target.begin(&[&arguments.trace], console)?;
+    let begun = arguments.target.begin(&[&arguments.trace], console)?;
+    let traces = begun.traces.clone();
     let ShuffleArguments { order, seed, memory, .. } = *arguments;
     let options = ShuffleOptions { order, seed, memory: memory << 20 };
-    arguments.target.save(&Shuffle::new(&traces[0], options)?, &traces, 0, console)
+    begun.save(&Shuffle::new(&traces[0], options)?, 0, console)
+}
+
+/// The traces, open, and the files to write, begun.
+struct Begun {
+    traces: Vec<Trace>,
+    compression: Compression,
+    file: OutputFile,
+    json: Option<Json>,
 }
 
 impl Target {
-    /// Checks the files and opens the traces.
-    fn begin(&self, inputs: &[&Path], console: &Console) -> Result<Vec<Trace>> {
+    /// Checks the files, opens the traces and begins what is written.
+    fn begin(&self, inputs: &[&Path], console: &Console) -> Result<Begun> {
         if self.output == Path::new("-") {
             return Err(Error::config(
                 "a trace cannot go to standard output",
@@ -188,20 +206,19 @@ impl Target {
         let outputs: Vec<&Path> = [&*self.output].into_iter().chain(self.json.path()).collect();
         check(inputs, &outputs)?;
         check_output(&self.output, Kind::Trace)?;
-        inputs.iter().map(|path| open_trace(path, console)).collect()
-    }
-
-    /// Writes the new trace, and says so. What of the old ones no trace has is named.
-    fn save(
-        &self,
-        edit: &dyn Edit,
-        traces: &[Trace],
-        rounded: u64,
-        console: &Console,
-    ) -> Result<()> {
+        let open = |path: &&Path| open_trace(path, console);
+        let traces = inputs.iter().map(open).collect::<Result<Vec<Trace>>>()?;
         let file = OutputFile::create(&self.output)?;
         let json = self.json.open()?;
-        for trace in traces {
+        Ok(Begun { traces, compression: self.compress, file, json })
+    }
+}
+
+impl Begun {
+    /// Writes the new trace, and says so. What of the old ones no trace has is named.
+    fn save(self, edit: &dyn Edit, rounded: u64, console: &Console) -> Result<()> {
+        let Begun { traces, compression, file, json } = self;
+        for trace in &traces {
             let lost = trace.extra_columns().iter().map(|(name, _)| format!("column '{name}'"));
             let lost = lost.chain(trace.extra_metadata().map(|key| format!("entry '{key}'")));
             let lost: Vec<String> = lost.collect();
@@ -211,8 +228,8 @@ impl Target {
             }
         }
         let header = edit.header();
-        let place = self.output.display().to_string();
-        let options = WriteOptions { compression: self.compress, ..WriteOptions::default() };
+        let place = file.path().display().to_string();
+        let options = WriteOptions { compression, ..WriteOptions::default() };
         let mut writer = TraceWriter::new(file, &place, header.clone(), options)?;
         let progress = console.progress("writing", "fragments");
         write(edit, &mut writer, &mut |done, of| progress.set(done, of))?;

@@ -75,7 +75,7 @@ enum Command {
 /// Parses the process's arguments and runs the command.
 ///
 /// Exit codes: 0 for success; 1 where something could not be done or a file is
-/// bad; 2 where the command line asks for what cannot be.
+/// bad; 2 where the command line asks for what cannot be; 3 where `diff` finds a difference.
 pub fn main() -> ExitCode {
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
@@ -98,7 +98,11 @@ pub fn main() -> ExitCode {
             return ExitCode::from(if error.is_config() { 2 } else { 1 });
         }
     }
-    ExitCode::from(if console.has_failed() { 1 } else { 0 })
+    ExitCode::from(match (console.has_failed(), console.has_differed()) {
+        (true, _) => 1,
+        (_, true) => 3,
+        _ => 0,
+    })
 }
 
 /// Prints what clap has to say: help and the version to standard output, which may be full,

@@ -20,19 +20,24 @@ pub fn place(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
 }
 
-/// The compiler that `variable` names, or the system's own.
-pub fn compiler(variable: &str, own: &str) -> Option<String> {
+/// The compiler that `variable` names, or the system's own, for tests of `what`.
+pub fn compiler(variable: &str, own: &str, what: &str) -> Option<String> {
     let name = std::env::var(variable).unwrap_or(own.into());
     let found = Command::new(&name).arg("--version").output();
     if found.is_ok_and(|output| output.status.success()) {
         return Some(name);
     }
+    absent(&name, what);
+    None
+}
+
+/// Says that a test of `what` is skipped; with `SCREENDOOR_CC=require` it fails.
+pub fn absent(name: &str, what: &str) {
     let required = std::env::var_os("SCREENDOOR_CC").is_some_and(|v| v == "require");
     assert!(!required, "SCREENDOOR_CC=require, but there is no {name}");
     // Not by the macro, of which a passed test's words are not shown.
-    let said = format!("skipped a test of the C header: there is no {name}\n");
+    let said = format!("skipped a test of {what}: there is no {name}\n");
     std::io::stderr().write_all(said.as_bytes()).unwrap();
-    None
 }
 
 /// A program in a folder of its own, where it runs.
@@ -78,7 +83,7 @@ impl Program {
 
 /// `tests/c/check.c`.
 fn check() -> Option<Program> {
-    let cc = compiler("CC", "cc")?;
+    let cc = compiler("CC", "cc", "the C header")?;
     Some(Program::build(&cc, &["-std=c99", "-Wconversion", "-Wshadow"], "tests/c/check.c"))
 }
 
@@ -93,7 +98,7 @@ fn the_document_has_the_example() {
 
 #[test]
 fn the_example_writes_what_it_says() {
-    let Some(cc) = compiler("CC", "cc") else { return };
+    let Some(cc) = compiler("CC", "cc", "the C header") else { return };
     let example = Program::build(&cc, &["-std=c99", "-Wconversion", "-Wshadow"], EXAMPLE);
     example.run_well(&[]);
     let trace = Trace::open(example.file("discs.arrow")).unwrap();
@@ -117,8 +122,8 @@ fn the_example_writes_what_it_says() {
 
 #[test]
 fn the_example_is_cpp_too() {
-    let Some(cc) = compiler("CC", "cc") else { return };
-    let Some(cpp) = compiler("CXX", "c++") else { return };
+    let Some(cc) = compiler("CC", "cc", "the C header") else { return };
+    let Some(cpp) = compiler("CXX", "c++", "the C header") else { return };
     let bytes = [(cc, ["-x", "c", "-std=c99"]), (cpp, ["-x", "c++", "-std=c++11"])].map(
         |(compiler, flags)| {
             let example = Program::build(&compiler, &flags, EXAMPLE);

@@ -13,7 +13,7 @@ use screendoor::gpu::capture::{Captured, FragmentBuffer, RawFragment, append_wgs
 use screendoor::random::Stream;
 use screendoor::trace::{Fragment, Trace};
 
-use crate::c_header::{compiler, place};
+use crate::c_header::{absent, compiler, place};
 use crate::gpu_capture::{draw_on, foreign};
 
 /// The size of the examples' frame.
@@ -81,9 +81,18 @@ struct Example {
 
 impl Example {
     fn build() -> Option<Self> {
-        let cc = compiler("CC", "cc")?;
-        compiler("GLSLANG", "glslangValidator")?;
+        const FOR: &str = "the shaders' twins";
+        let cc = compiler("CC", "cc", FOR)?;
+        compiler("GLSLANG", "glslangValidator", FOR)?;
         let folder = tempfile::tempdir().unwrap();
+        let probe = folder.path().join("probe.c");
+        fs::write(&probe, "#include <vulkan/vulkan.h>\nint main(void) { return 0; }\n").unwrap();
+        let mut has_vulkan = Command::new(&cc);
+        has_vulkan.arg(&probe).args(["-lvulkan", "-o"]).arg(folder.path().join("probe"));
+        if !has_vulkan.output().unwrap().status.success() {
+            absent("header or loader of Vulkan", FOR);
+            return None;
+        }
         let output = Command::new(cc)
             .args(["-std=c99", "-O1", "-Wall", "-Wextra", "-Wno-missing-field-initializers"])
             .arg("-Werror")

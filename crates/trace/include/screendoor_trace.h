@@ -1106,10 +1106,17 @@ bool screendoor_trace_close(screendoor_trace *trace) {
         return fclose(file), false;
     }
     if (fclose(file) != 0) return screendoor_i_io(trace, "write");
+    if (rename(trace->partial, trace->path) != 0) {
 #ifdef _WIN32
-    remove(trace->path); /* which renaming does not replace there */
+        /* Renaming does not replace there. What is whole is not removed any more: where it
+         * cannot have its name it keeps the other one. */
+        trace->begun = false;
+        if (remove(trace->path) != 0 || rename(trace->partial, trace->path) != 0)
+            return screendoor_i_io(trace, "name (the trace is whole, with .partial after its name)");
+#else
+        return screendoor_i_io(trace, "name");
 #endif
-    if (rename(trace->partial, trace->path) != 0) return screendoor_i_io(trace, "name");
+    }
     trace->begun = false, trace->closed = true;
     return true;
 }

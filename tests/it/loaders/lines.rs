@@ -3,6 +3,7 @@
 use serde_json::json;
 
 use glam::{Vec3, Vec4};
+use screendoor::capture::{Capture, CaptureOptions};
 use screendoor::scene::{LoadOptions, Scene, Shape, Strands, load_with};
 
 use super::folder;
@@ -59,10 +60,51 @@ fn lines_beside_faces_are_drawn_where_a_width_is_given() {
 }
 
 #[test]
+fn lines_beside_splats_leave_these_alone() {
+    let mut model = Model::quad();
+    let [rotations, scales, opacities] = [("VEC4", 16), ("VEC3", 12), ("SCALAR", 4)]
+        .map(|(shape, n)| model.floats(&vec![if shape == "VEC4" { 0.5 } else { 0.25 }; n], shape));
+    let colours = model.floats(&[0.1; 12], "VEC3");
+    let name = "KHR_gaussian_splatting";
+    model.json["extensionsUsed"] = json!([name]);
+    let positions = model.primitive()["attributes"]["POSITION"].clone();
+    model.json["meshes"][0]["primitives"] = json!([
+        { "mode": 0, "attributes": {
+            "POSITION": positions,
+            "KHR_gaussian_splatting:ROTATION": rotations,
+            "KHR_gaussian_splatting:SCALE": scales,
+            "KHR_gaussian_splatting:OPACITY": opacities,
+            "KHR_gaussian_splatting:SH_DEGREE_0_COEF_0": colours },
+          "extensions": { name: { "kernel": "ellipse", "colorSpace": "srgb_rec709_display" } } },
+        { "mode": 1, "attributes": { "POSITION": positions } },
+    ]);
+    let scene = loaded("a.gltf", model.json.to_string().as_bytes(), None).unwrap();
+    assert_eq!((scene.shapes.len(), scene.objects.len()), (1, 1), "{:?}", scene.warnings);
+    assert!(scene.warnings.iter().any(|w| w.contains("2 lines beside surfaces are not drawn")));
+    let options = CaptureOptions { width: 8, height: 8, ..CaptureOptions::default() };
+    Capture::new(&scene, &options).unwrap();
+}
+
+#[test]
+fn lines_in_places_of_several_sizes_are_of_one_width() {
+    let mut model = Model::quad();
+    model.primitive()["mode"] = 3.into();
+    model.json["nodes"] = json!([
+        { "mesh": 0 }, { "mesh": 0, "scale": [10, 10, 10] }, { "mesh": 0, "scale": [1, 1, 0] },
+    ]);
+    model.json["scenes"] = json!([{ "nodes": [0, 1, 2] }]);
+    let scene = loaded("a.gltf", model.json.to_string().as_bytes(), Some(0.5)).unwrap();
+    let radius = |object: usize| strands(&scene, object).radii[0];
+    assert_eq!([radius(0), radius(1), radius(2)], [0.25, 0.025, 0.0]);
+    assert!(scene.warnings.iter().any(|w| w.contains("squashed flat")), "{:?}", scene.warnings);
+}
+
+#[test]
 fn lines_that_cannot_be_are_refused() {
     let refused = |text: &str, width| loaded("a.obj", text.as_bytes(), width).unwrap_err();
     assert!(refused("v 0 0 0\nv 1 0 0\nl 1 3\n", None).contains("line 3: vertex 3 is not there"));
-    assert!(refused("v 0 0 0\nl 1\n", None).contains("line 2: a line has at least two points"));
+    assert!(refused("v 0 0 0\nl\n", None).contains("line 2: the line has no points"));
+    assert!(refused("v 0 0 0\nv 0 0 0\nl 1 2\n", None).contains("lines of no extent"));
     assert!(refused("v 0 0 0\nv 1 0 0\nl 1 x\n", None).contains("line 3"));
     for width in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         assert!(refused(CURVES, Some(width)).contains("give a width above 0"));

@@ -103,7 +103,7 @@ fn files_of_ordinary_exporters_are_read() {
     // Points are not polygons.
     let scene = obj(format!("{TRIANGLE}p 1\nf 1 2\nf 1 2 3\n")).unwrap();
     assert_eq!(scene.primitive_count(), 1);
-    warned(&scene, 1, &["2 points and faces of fewer"]);
+    warned(&scene, 1, &["2 points, lines of one and faces of fewer"]);
     // Colours of some vertices, whichever.
     let scene = obj("v 0 0 0\nv 1 0 0 1 0 0\nv 0 1 0 0 0 1\nv 9 9 9\nf 1 2 3\n").unwrap();
     let colours: Vec<Vec3> = mesh(&scene, 0).colours.iter().map(|c| c.truncate()).collect();

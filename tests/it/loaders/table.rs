@@ -323,10 +323,10 @@ fn obj_cases() -> Vec<Case> {
             Says(obj(format!("{TRIANGLE}l 1 2 3\n")), "how wide its 2 lines are"),
         ),
         case(
-            "`p`, faces of two corners",
+            "`p`, lines of one point, faces of two corners",
             Says(
-                obj(format!("{TRIANGLE}p 1\nf 1 2\nf 1 2 3\n")),
-                "2 points and faces of fewer than three corners are not drawn",
+                obj(format!("{TRIANGLE}p 1\nl 2\nf 1 2\nf 1 2 3\n")),
+                "3 points, lines of one and faces of fewer than three corners are not drawn",
             ),
         ),
         case(
@@ -788,7 +788,7 @@ fn other_cases() -> Vec<Case> {
             Says(file("a.tfx", tfx(3, 4, |head| head[0] = 3.0_f32.to_bits())), "TressFX version 3"),
         ),
         vdb(
-            "a float grid of densities",
+            "a grid of densities, of floats or doubles",
             Shows(written(Written::default()), |scene| {
                 assert_eq!(particles(scene).centres.len(), 2)
             }),
@@ -835,7 +835,7 @@ fn other_cases() -> Vec<Case> {
             ),
         ),
         vdb(
-            "no float grid",
+            "no grid of real numbers",
             Says(written(Written { kind: "Tree_vec3s_5_4_3", ..Written::default() }), "no grid of"),
         ),
         vdb(

@@ -102,6 +102,14 @@ pub fn full() -> Written {
 }
 
 impl Written {
+    /// A value of the grid's type.
+    fn number(&self, value: f32) -> Vec<u8> {
+        match self.kind.contains("double") {
+            true => f64::from(value).to_le_bytes().to_vec(),
+            false => value.to_le_bytes().to_vec(),
+        }
+    }
+
     fn values(&self, values: &[f32], count: usize, active: &[usize]) -> Vec<u8> {
         // All values, or the active ones and nothing of the others.
         let packed = self.packing & 2 != 0;
@@ -111,7 +119,7 @@ impl Written {
         let mut bytes = vec![if packed { 0 } else { 6 }];
         let block: Vec<u8> = match self.half {
             true => stored.iter().flat_map(|v| half::f16::from_f32(*v).to_le_bytes()).collect(),
-            false => stored.iter().flat_map(|v| v.to_le_bytes()).collect(),
+            false => stored.iter().flat_map(|v| self.number(*v)).collect(),
         };
         if block.is_empty() && self.half {
             return bytes;
@@ -130,7 +138,7 @@ impl Written {
             // What is short is not packed.
             _ if block.len() < 48 => (block.clone(), -(block.len() as i64)),
             _ => {
-                let packed = blosc(&block, if self.half { 2 } else { 4 });
+                let packed = blosc(&block, if self.half { 2 } else { self.number(0.0).len() });
                 let length = packed.len() as i64;
                 (packed, length)
             }
@@ -156,8 +164,9 @@ impl Written {
         head.extend(self.map.1.iter().flat_map(|v| v.to_le_bytes()));
 
         // The tree: one buffer, no tiles, one child at the origin.
-        let background = self.background.to_bits();
-        let mut tree = [1_u32, background, 0, 1, 0, 0].map(u32::to_le_bytes).concat();
+        let mut tree = 1_u32.to_le_bytes().to_vec();
+        tree.extend(self.number(self.background));
+        tree.extend([0_u32, 1, 0, 0].map(u32::to_le_bytes).concat());
         tree.extend((-4096_i32).to_le_bytes());
         // z from −4096 on: −8 lies in child 31 of 128 along z, and there in leaf 15.
         tree.extend(mask(32768, &[31]));
@@ -241,8 +250,10 @@ fn every_way_of_packing_gives_the_same() {
     assert_eq!(particles(&expected).centres.len(), 512);
     for packing in [0, 1, 2, 3, 4, 6] {
         for half in [false, true] {
-            for version in [222, 224] {
-                let scene = Written { packing, half, version, ..plain.clone() }.load();
+            for (version, kind) in
+                [(222, "Tree_float_5_4_3"), (224, "Tree_float_5_4_3"), (224, "Tree_double_5_4_3")]
+            {
+                let scene = Written { packing, half, version, kind, ..plain.clone() }.load();
                 let scene = scene.unwrap_or_else(|e| panic!("{packing}, {half}: {e}"));
                 let (a, b) = (particles(&scene), particles(&expected));
                 assert_eq!((&a.centres, &a.colours), (&b.centres, &b.colours), "{packing}, {half}");
@@ -360,7 +371,10 @@ fn of_several_grids_the_fog_is_drawn_or_the_one_that_is_named() {
     };
     says("sdf", "distances to surfaces (level sets: 'sdf'), no density");
     says("surface", "level sets: 'surface'");
-    says("vel", "no grid of Tree_float_5_4_3 (it has: 'vel' of Tree_vec3s_5_4_3)");
+    says(
+        "vel",
+        "no grid of Tree_float_5_4_3 or Tree_double_5_4_3 (it has: 'vel' of Tree_vec3s_5_4_3)",
+    );
     says("smok", "unknown grid 'smok'; did you mean 'smoke'?");
     let error =
         load_with("a.obj", &LoadOptions { grid: Some("a".into()), ..LoadOptions::default() })

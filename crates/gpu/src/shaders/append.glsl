@@ -1,5 +1,7 @@
 // Records the fragments that a fragment shader is run for: the twin of append.wgsl, for
-// Vulkan, and for OpenGL from 4.5 on. To be put after a shader's #version, before its own text.
+// Vulkan, and for OpenGL from 4.5 on with glClipControl(GL_UPPER_LEFT, GL_ZERO_TO_ONE), which
+// counts rows from the top as traces do. To be put after a shader's #version, before its own
+// text.
 //
 // Bound as set 0, binding 0, where nothing else is said before.
 #ifndef SCREENDOOR_SET
@@ -12,8 +14,6 @@
 #define SCREENDOOR_PLACE set = SCREENDOOR_SET, binding = SCREENDOOR_BINDING
 #else
 #define SCREENDOOR_PLACE binding = SCREENDOOR_BINDING
-// Rows of a trace begin at the top.
-layout(origin_upper_left) in vec4 gl_FragCoord;
 #endif
 
 // What one primitive leaves in one pixel. Eleven words, 44 bytes.

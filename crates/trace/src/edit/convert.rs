@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use half::f16;
 
 use crate::edit::{Edit, Progress, Push, each_row};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::trace::{ColourFormat, ColumnId, Header, Scalar, Trace};
 
 crate::options! {
@@ -20,7 +20,8 @@ crate::options! {
 /// How a trace is stored otherwise.
 #[derive(Clone, Copy, Debug)]
 pub struct ConvertOptions {
-    /// The precision of colours; the trace's own where it is `None`.
+    /// The precision of colours; where it is `None`, the trace's own, or single precision where
+    /// half would round a stated colour that is stored now.
     pub colour: Option<ColourFormat>,
     /// Which columns are stated.
     pub constants: Constants,
@@ -40,6 +41,9 @@ pub struct Convert<'a> {
     header: Header,
 }
 
+/// The columns of colours.
+const COLOURS: [ColumnId; 3] = [ColumnId::R, ColumnId::G, ColumnId::B];
+
 impl<'a> Convert<'a> {
     /// Finds out what the new trace's header is.
     ///
@@ -57,25 +61,44 @@ impl<'a> Convert<'a> {
         if options.colour.is_none() && stores_what_halves_lack(old, &header) {
             header.colour = ColourFormat::F32;
         }
+        // A file says by the type of a stored colour how precise colours are, and designs take
+        // the width that they store them in from that.
+        if header.colour == ColourFormat::F32 && !COLOURS.iter().any(|id| header.stores(*id)) {
+            header.constants.remove(&ColumnId::R);
+        }
         Ok(Convert { trace, header })
     }
 
     /// How many fragments have colours that lose something in the new trace's precision.
     ///
     /// # Errors
-    /// Those of reading the trace.
+    /// Those of reading the trace; [`Error::Unsupported`] for a colour that half precision
+    /// cannot hold.
     pub fn rounded(&self, progress: Progress<'_>) -> Result<u64> {
-        let narrower = self.trace.header().colour == ColourFormat::F32
-            && self.header.colour == ColourFormat::F16;
-        let mut rounded = 0;
-        if narrower {
-            let stored = [ColumnId::R, ColumnId::G, ColumnId::B].map(|id| self.header.stores(id));
-            each_row(self.trace, (0, self.trace.rows()), progress, |_, fragment| {
-                let loses = |(stored, c): (bool, f32)| stored && !is_half(c);
-                rounded += u64::from(stored.into_iter().zip(fragment.colour).any(loses));
-                Ok(())
-            })?;
+        let stored = COLOURS.map(|id| self.header.stores(id));
+        let old = self.trace.header();
+        // What was stored as halves already loses nothing.
+        let may = old.colour == ColourFormat::F32 || stores_what_halves_lack(old, &self.header);
+        if self.header.colour == ColourFormat::F32 || !may {
+            return Ok(0);
         }
+        let mut rounded = 0;
+        each_row(self.trace, (0, self.trace.rows()), progress, |row, fragment| {
+            let colours = stored.into_iter().zip(fragment.colour).filter(|(stored, _)| *stored);
+            let mut loses = false;
+            for (_, value) in colours {
+                if f16::from_f32(value).is_infinite() {
+                    return Err(Error::unsupported(
+                        format_args!("{}, row {row}", self.trace.place()),
+                        format_args!("its colour {value} is beyond 65504, half precision's most"),
+                        "keep colours in single precision",
+                    ));
+                }
+                loses |= !is_half(value);
+            }
+            rounded += u64::from(loses);
+            Ok(())
+        })?;
         Ok(rounded)
     }
 }
@@ -98,14 +121,14 @@ fn is_half(value: f32) -> bool {
 /// Whether `new` stores in half precision a colour that `old` states and that it would round.
 pub(super) fn stores_what_halves_lack(old: &Header, new: &Header) -> bool {
     let lacks = |(id, value): (&ColumnId, &Scalar)| {
-        let colour = [ColumnId::R, ColumnId::G, ColumnId::B].contains(id);
-        colour && new.stores(*id) && matches!(value, Scalar::Real(v) if !is_half(*v))
+        let stored = COLOURS.contains(id) && new.stores(*id);
+        stored && matches!(value, Scalar::Real(v) if !is_half(*v))
     };
     new.colour == ColourFormat::F16 && old.constants.iter().any(lacks)
 }
 
-/// The columns that have one value in all rows, to the bit; those that are stated already
-/// where there are none.
+/// The columns that have one value in all rows, to the bit, but for one that stays stored:
+/// rows of no column cannot be counted. Those that are stated already where there are no rows.
 fn constants(trace: &Trace, progress: Progress<'_>) -> Result<BTreeMap<ColumnId, Scalar>> {
     let mut found: Option<BTreeMap<ColumnId, Scalar>> = None;
     each_row(trace, (0, trace.rows()), progress, |_, fragment| {
@@ -118,5 +141,9 @@ fn constants(trace: &Trace, progress: Progress<'_>) -> Result<BTreeMap<ColumnId,
         }
         Ok(())
     })?;
-    Ok(found.unwrap_or_else(|| trace.header().constants.clone()))
+    let Some(mut found) = found else { return Ok(trace.header().constants.clone()) };
+    if ColumnId::ALL.into_iter().all(|id| !trace.header().has(id) || found.contains_key(&id)) {
+        found.remove(&ColumnId::X);
+    }
+    Ok(found)
 }

@@ -5,7 +5,9 @@ use serde::Serialize;
 use crate::edit::Progress;
 use crate::error::Result;
 use crate::param::Options;
-use crate::trace::{Batch, ColumnId, ColumnKind, Fragment, Header, Scalar, Trace, View};
+use crate::trace::{
+    Batch, ColourFormat, ColumnId, ColumnKind, Fragment, Header, Scalar, Trace, View,
+};
 
 /// What two traces have in common: as little as the worst of their pixels.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize)]
@@ -69,8 +71,8 @@ pub struct Difference {
     /// The columns that differ, over the fragments that stand in the same place of their
     /// pixel, in the pixels that have the same number of them in both.
     pub columns: Vec<ColumnDifference>,
-    /// In how many pixels columns were compared: the first that differ, as far as memory
-    /// goes.
+    /// In how many pixels columns were compared: of those that differ and have as many fragments
+    /// in both, the first that fit into memory.
     pub compared: u64,
 }
 
@@ -92,6 +94,10 @@ pub fn header_differences(a: &Header, b: &Header) -> Vec<HeaderDifference> {
         let positions: Vec<String> =
             pattern.positions.iter().map(|[x, y]| format!("{x},{y}")).collect();
         let optional: Vec<&str> = header.optional.iter().map(|id| id.name()).collect();
+        let colours = match header.colour {
+            ColourFormat::F16 => "half precision",
+            ColourFormat::F32 => "single precision",
+        };
         let view = View::KEYS.map(|key| {
             let said = header
                 .view
@@ -106,6 +112,8 @@ pub fn header_differences(a: &Header, b: &Header) -> Vec<HeaderDifference> {
             ("pattern", pattern.name.clone(), false),
             ("background", header.background.map(|c| c.to_string()).join(" "), true),
             ("space", header.space.name().to_string(), true),
+            // Designs store colours as wide as the trace has them, where nothing else is said.
+            ("colours", colours.to_string(), true),
             ("source", header.source.clone(), false),
             ("camera", header.camera.clone(), false),
             ("optional columns", optional.join(" "), false),
@@ -130,8 +138,10 @@ struct Seen {
 
 /// What a pixel takes.
 const PIXEL: u64 = 2 * size_of::<Seen>() as u64;
-/// What a fragment takes while it is held.
-const HELD: u64 = size_of::<Fragment>() as u64;
+/// What a fragment takes while it is held: with its pixel's place, and what sorting takes.
+const HELD: u64 = size_of::<(usize, Fragment)>() as u64 * 3 / 2;
+/// What a pixel takes that is looked at.
+const PLACE: u64 = size_of::<u64>() as u64;
 
 /// Compares the fragments of two traces whose frames are of one size, pixel by pixel: in a
 /// trace only the order within a pixel means anything. Values are compared to the bit,
@@ -170,7 +180,7 @@ pub fn difference(traces: [&Trace; 2], memory: u64, progress: Progress<'_>) -> R
     found.same = Kept::Pixels;
     let mut chosen: Vec<u64> = Vec::new();
     let mut first = None;
-    let mut held = 0_u64;
+    let (mut held, mut fragments) = (0_u64, 0);
     for (i, (top, bottom)) in bands.iter().copied().enumerate() {
         let mut seen = vec![[Seen::default(); 2]; (u64::from(bottom - top) * width) as usize];
         for (side, trace) in traces.into_iter().enumerate() {
@@ -189,15 +199,18 @@ pub fn difference(traces: [&Trace; 2], memory: u64, progress: Progress<'_>) -> R
             found.same = found.same.max(if reordered { Kept::Fragments } else { Kept::Nothing });
             let pixel = u64::from(top) * width + pixel as u64;
             first.get_or_insert(pixel);
-            held = (a.fragments + b.fragments).saturating_mul(HELD).saturating_add(held);
-            if held <= memory {
+            // Columns are compared where the fragments of both stand beside each other.
+            let needs = a.fragments.saturating_mul(2 * HELD).saturating_add(PLACE);
+            if a.fragments == b.fragments && needs <= memory - held {
+                held += needs;
+                fragments += a.fragments as usize;
                 chosen.push(pixel);
             }
         }
         progress(i as u64 + 1, bands.len() as u64);
     }
     found.first = first.map(|pixel| first_of(traces, pixel, width)).transpose()?;
-    look(traces, &chosen, width, &mut found)?;
+    look(traces, &chosen, fragments, width, &mut found)?;
     Ok(found)
 }
 
@@ -263,35 +276,40 @@ fn scramble(word: u64) -> u64 {
     x ^ x >> 31
 }
 
-/// Looks at the fragments of some pixels that differ, which are in ascending order.
-fn look(traces: [&Trace; 2], pixels: &[u64], width: u64, found: &mut Difference) -> Result<()> {
-    let mut sides = [(); 2].map(|()| vec![Vec::new(); pixels.len()]);
+/// Looks at the fragments of some pixels that differ, which are in ascending order and have
+/// `count` fragments together, in each trace as many.
+fn look(
+    traces: [&Trace; 2],
+    pixels: &[u64],
+    count: usize,
+    width: u64,
+    found: &mut Difference,
+) -> Result<()> {
+    let mut sides = [(); 2].map(|()| Vec::new());
     for (side, trace) in sides.iter_mut().zip(traces) {
+        side.reserve_exact(count);
         for fragment in rows(trace) {
             let fragment = fragment?;
             if let Ok(i) = pixels.binary_search(&place(&fragment, width)) {
-                side[i].push(fragment);
+                side.push((i, fragment));
             }
         }
+        // Stably: the order within a pixel stays.
+        side.sort_by_key(|(i, _)| *i);
     }
-    let [a, b] = sides;
     let mut columns =
         ColumnId::ALL.map(|id| ColumnDifference { column: id.name(), fragments: 0, most: 0.0 });
-    for (a, b) in a.iter().zip(&b) {
-        if a.len() != b.len() {
-            continue;
-        }
-        found.compared += 1;
-        for (a, b) in a.iter().zip(b) {
-            for (id, column) in ColumnId::ALL.into_iter().zip(&mut columns) {
-                let [a, b] = [a, b].map(|fragment| fragment.value(id));
-                if !a.is(b) {
-                    column.fragments += 1;
-                    column.most = column.most.max(apart(id, a, b));
-                }
+    let [a, b] = sides;
+    for ((_, a), (_, b)) in a.iter().zip(&b) {
+        for (id, column) in ColumnId::ALL.into_iter().zip(&mut columns) {
+            let [a, b] = [a, b].map(|fragment| fragment.value(id));
+            if !a.is(b) {
+                column.fragments += 1;
+                column.most = column.most.max(apart(id, a, b));
             }
         }
     }
+    found.compared = pixels.len() as u64;
     found.columns = columns.into_iter().filter(|column| column.fragments > 0).collect();
     Ok(())
 }

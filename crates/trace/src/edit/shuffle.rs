@@ -44,8 +44,8 @@ pub struct Shuffle<'a> {
     header: Header,
 }
 
-/// What a fragment takes while it is held: itself, its key and its row.
-const HELD: u64 = (size_of::<Fragment>() + 16) as u64;
+/// What a fragment takes while it is held: itself, its key and its number.
+const HELD: u64 = size_of::<(u64, u64, Fragment)>() as u64;
 /// Into how many ranges keys are counted at a time.
 const RANGES: u64 = 1 << 16;
 
@@ -125,14 +125,16 @@ impl<'a> Shuffle<'a> {
         }
         let most = self.options.memory / HELD;
         if count <= most {
-            // Not what the file claims: what came.
-            let mut held: Vec<(u64, Fragment)> = Vec::new();
+            // No more than the memory allows, whatever a file claims.
+            let mut held: Vec<(u64, u64, Fragment)> = Vec::new();
+            held.reserve_exact(count as usize);
             self.among(keys, |key, fragment| {
-                held.push((key, fragment));
+                held.push((key, held.len() as u64, fragment));
                 Ok(())
             })?;
-            held.sort_by_key(|(key, _)| *key);
-            return held.iter().try_for_each(|(_, fragment)| push(fragment));
+            // In place; what has one key keeps its order by its number.
+            held.sort_unstable_by_key(|(key, number, _)| (*key, *number));
+            return held.iter().try_for_each(|(_, _, fragment)| push(fragment));
         }
         // As many keys a range as make no more than so many ranges.
         let each = (keys.last - keys.first) / RANGES + 1;

@@ -109,6 +109,27 @@ fn constant_columns_are_found_stated_and_stored() {
     assert_eq!(fragments(&found).map_bits(), signed.to_vec().map_bits());
 }
 
+#[test]
+fn one_column_stays_stored_and_wide_colours_stay_wide() {
+    let wide = header(40, 30, 8);
+    let fragment = made_up(&wide, 1)[0];
+    let find = |trace: &Trace| {
+        let options = ConvertOptions { constants: Constants::Find, ..ConvertOptions::default() };
+        made(&Convert::new(trace, options, &mut |_, _| ()).unwrap())
+    };
+    let found = find(&trace(&wide, &[fragment; 3]));
+    assert_eq!(fragments(&found), [fragment; 3]);
+    assert_eq!(found.header().colour, ColourFormat::F32);
+    let narrow = Header { colour: ColourFormat::F16, ..wide.clone() };
+    let fragment = Fragment { colour: [0.25, 0.5, 0.75], ..fragment };
+    let found = find(&trace(&narrow, &[fragment; 3]));
+    assert_eq!((fragments(&found), found.columns().len()), (vec![fragment; 3], 1));
+    let all = ColumnId::ALL.into_iter().filter(|id| wide.has(*id));
+    let constants = all.map(|id| (id, fragment.value(id))).collect();
+    let error = Header { constants, ..wide }.check().unwrap_err();
+    assert!(error.to_string().contains("rows cannot be counted"), "{error}");
+}
+
 trait Bits {
     fn map_bits(&self) -> Vec<u64>;
 }
@@ -131,6 +152,12 @@ fn rounded_colours_are_counted_and_stated_ones_are_not_rounded() {
     assert_eq!(convert.rounded(&mut |_, _| ()).unwrap(), 2);
     assert_eq!(fragments(&made(&convert))[0].colour[0], half::f16::from_f32(0.1).to_f32());
 
+    // What halves cannot hold at all is told with its row.
+    let bright = self::trace(&wide, &[fragment, Fragment { colour: [7e4; 3], ..fragment }]);
+    let error = Convert::new(&bright, options, &mut |_, _| ()).unwrap();
+    let error = error.rounded(&mut |_, _| ()).unwrap_err().to_string();
+    assert!(error.contains("test, row 1") && error.contains("beyond 65504"), "{error}");
+
     // 0.1 is stated beside stored halves, and would be rounded if it were stored as one.
     let constants = [(ColumnId::R, Scalar::Real(0.1))].into();
     let narrow = Header { colour: ColourFormat::F16, constants, ..wide };
@@ -139,6 +166,11 @@ fn rounded_colours_are_counted_and_stated_ones_are_not_rounded() {
     let options = ConvertOptions { constants: Constants::Store, ..ConvertOptions::default() };
     let stored = made(&Convert::new(&stated, options, &mut |_, _| ()).unwrap());
     assert_eq!(fragments(&stored), [fragment]);
+    // Unless halves are asked for: then it is counted.
+    let colour = Some(ColourFormat::F16);
+    let options = ConvertOptions { colour, constants: Constants::Store };
+    let convert = Convert::new(&stated, options, &mut |_, _| ()).unwrap();
+    assert_eq!(convert.rounded(&mut |_, _| ()).unwrap(), 1);
     let plain = self::trace(
         &Header { constants: [].into(), ..narrow },
         &[Fragment { colour: [0.5; 3], ..fragment }],

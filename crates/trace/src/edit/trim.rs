@@ -33,6 +33,14 @@ pub struct TrimOptions {
     pub objects: Option<RangeInclusive<u32>>,
 }
 
+impl TrimOptions {
+    /// Whether all of a trace is kept.
+    pub fn is_all(&self) -> bool {
+        let ranges = [self.rows.is_some(), self.primitives.is_some(), self.objects.is_some()];
+        self.area.is_none() && self.samples.is_none() && !ranges.contains(&true)
+    }
+}
+
 /// A part of a trace: its fragments keep their order and their numbers. Those that cover none
 /// of the samples that are kept are not in it.
 #[derive(Debug)]

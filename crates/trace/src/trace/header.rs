@@ -201,6 +201,12 @@ impl Header {
                 "name it in the header's optional columns",
             ));
         }
+        if !ColumnId::ALL.iter().any(|id| self.stores(*id)) {
+            return Err(Error::config(
+                "all columns are constant, so that rows cannot be counted",
+                "store one of them",
+            ));
+        }
         if !self.background.iter().all(|c| c.is_finite()) {
             return Err(Error::config("the background is not finite", "give three finite numbers"));
         }

@@ -147,6 +147,10 @@ fn what_is_packed_is_read_where_it_is_unpacked_too() {
     });
     let error = error.unwrap_err().to_string();
     assert!(error.contains("no triangles") && error.contains(draco), "{error}");
+    let mut required = Model::quad();
+    required.requires(draco);
+    let error = required.load().unwrap_err().to_string();
+    assert!(error.contains("unpack it: gltf-transform copy"), "{error}");
     // A buffer that is there for those who do not unpack, without bytes.
     let mut model = Model::quad();
     model.json["buffers"][0].as_object_mut().unwrap().remove("uri");
@@ -155,4 +159,5 @@ fn what_is_packed_is_read_where_it_is_unpacked_too() {
     model.json["bufferViews"][0]["extensions"] = json!({ "EXT_meshopt_compression": {} });
     let error = model.load().unwrap_err().to_string();
     assert!(error.contains("packed by EXT_meshopt_compression"), "{error}");
+    assert!(error.contains("gltf-transform copy"), "{error}");
 }

@@ -204,59 +204,50 @@ impl Transforms {
 }
 
 impl Lens {
-    /// What it says of each thing that makes up a projection, with the thing's name.
-    fn parts(&self) -> [(&'static str, Option<f64>); 6] {
+    /// All that it says, each with its name.
+    fn parts(&mut self) -> [(&'static str, &mut Option<f64>); 14] {
         [
-            ("w", self.w),
-            ("h", self.h),
-            ("fl_x", self.fl_x.or(self.camera_angle_x)),
-            ("fl_y", self.fl_y.or(self.camera_angle_y)),
-            ("cx", self.cx),
-            ("cy", self.cy),
+            ("w", &mut self.w),
+            ("h", &mut self.h),
+            ("fl_x", &mut self.fl_x),
+            ("fl_y", &mut self.fl_y),
+            ("cx", &mut self.cx),
+            ("cy", &mut self.cy),
+            ("camera_angle_x", &mut self.camera_angle_x),
+            ("camera_angle_y", &mut self.camera_angle_y),
+            ("k1", &mut self.k1),
+            ("k2", &mut self.k2),
+            ("k3", &mut self.k3),
+            ("k4", &mut self.k4),
+            ("p1", &mut self.p1),
+            ("p2", &mut self.p2),
         ]
     }
 
-    /// This one, a frame's, where it has a focal length, else the file's lens with what this one
-    /// adds to it. Programs differ in which of both they take a number from that both have, so
-    /// that half of a lens is none: nerfstudio has all of it in the file or all in each frame.
-    fn or(self, file: &Lens) -> std::result::Result<Self, String> {
-        let both = self.parts().into_iter().zip(file.parts());
-        let is_own = |v: &Option<f64>| v.is_some();
-        if is_own(&self.fl_x.or(self.camera_angle_x)) || is_own(&self.fl_y.or(self.camera_angle_y))
-        {
-            let lacks = both.filter(|((_, own), (_, file))| own.is_none() && file.is_some());
-            let lacks: Vec<&str> = lacks.map(|((name, _), _)| name).collect();
-            return match lacks.first() {
-                None => Ok(self),
-                Some(name) => Err(format!(
-                    "it has a focal length of its own and no '{name}', which the file has for \
-                     all: a frame has all of its lens or none"
-                )),
-            };
+    /// This one, a frame's, with what the file's says that it does not. What both say has to be
+    /// one number: some programs take the file's (nerfstudio), others the frame's.
+    fn or(mut self, file: &Lens) -> std::result::Result<Self, String> {
+        let mut file = *file;
+        let angles = [(self.camera_angle_x, self.fl_x), (self.camera_angle_y, self.fl_y)];
+        for ((angle, own), all) in angles.into_iter().zip([file.fl_x, file.fl_y]) {
+            if angle.is_some() && own.is_none() && all.is_some() {
+                return Err("it has an angle, and the file has a focal length for all frames: \
+                            leave one of both out"
+                    .to_string());
+            }
         }
-        let differs = |((_, own), (_, file)): &(_, (_, Option<f64>))| {
-            let (own, file): (&Option<f64>, &Option<f64>) = (own, file);
-            own.zip(*file).is_some_and(|(own, file)| own != file)
-        };
-        if let Some(((name, _), _)) = both.clone().find(differs) {
-            return Err(format!(
-                "its '{name}' is another one than the file's, whose focal length it has: a frame \
-                 has all of its lens or none"
-            ));
+        for ((name, own), (_, all)) in self.parts().into_iter().zip(file.parts()) {
+            match (&own, &all) {
+                (Some(own), Some(all)) if own != all => {
+                    return Err(format!(
+                        "its '{name}' is {own}, and the file's, for all frames, is {all}: leave \
+                         one of both out"
+                    ));
+                }
+                _ => *own = own.or(*all),
+            }
         }
-        Ok(Lens {
-            w: self.w.or(file.w),
-            h: self.h.or(file.h),
-            cx: self.cx.or(file.cx),
-            cy: self.cy.or(file.cy),
-            k1: self.k1.or(file.k1),
-            k2: self.k2.or(file.k2),
-            k3: self.k3.or(file.k3),
-            k4: self.k4.or(file.k4),
-            p1: self.p1.or(file.p1),
-            p2: self.p2.or(file.p2),
-            ..*file
-        })
+        Ok(self)
     }
 
     fn is_distorted(&self) -> bool {
@@ -339,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lens_is_the_file_s_or_a_frame_s_own() {
+    fn a_lens_is_put_together_of_the_file_s_and_a_frame_s() {
         let of = |file: &str, frame: &str| {
             let matrix = "[[1,0,0,0],[0,1,0,0],[0,0,1,0]]";
             read(&format!(r#"{{{file} "frames": [{{{frame} "transform_matrix": {matrix}}}]}}"#))
@@ -350,24 +341,29 @@ mod tests {
         };
         let all = r#""fl_x": 30, "fl_y": 31, "cx": 9, "cy": 8, "w": 20, "h": 10,"#;
         let own = ([30.0, 31.0], [9.0, 8.0], [20, 10]);
-        let other = r#""fl_x": 5, "fl_y": 6, "cx": 1, "cy": 2, "w": 4, "h": 3, "k1": 0,"#;
         assert_eq!(lens(all, ""), own);
         assert_eq!(lens("", all), own);
-        assert_eq!(lens(other, all), own);
+        assert_eq!(lens(all, all), own);
         // What the file leaves out, frames may add, and say again what it says.
+        assert_eq!(
+            lens(r#""w": 20, "h": 10,"#, r#""fl_x": 30, "fl_y": 31, "cx": 9, "cy": 8,"#),
+            own
+        );
         assert_eq!(
             lens(r#""fl_x": 30, "fl_y": 31, "w": 20, "h": 10,"#, r#""cx": 9, "cy": 8, "w": 20,"#),
             own
         );
         for (frame, part) in [
-            (r#""fl_x": 5,"#, "'w'"),
-            (r#""fl_x": 5, "fl_y": 6, "w": 4, "h": 3,"#, "'cx'"),
-            (r#""camera_angle_x": 1, "cx": 1, "cy": 2, "w": 4, "h": 3,"#, "'fl_y'"),
-            (r#""w": 4, "h": 3,"#, "its 'w' is another one"),
+            (r#""fl_x": 5,"#, "its 'fl_x' is 5, and the file's, for all frames, is 30"),
+            (r#""camera_angle_x": 1,"#, "it has an angle, and the file has a focal length"),
+            (r#""w": 4, "h": 3,"#, "its 'w' is 4"),
         ] {
             let error = of(all, frame).unwrap_err().to_string();
             assert!(error.contains(part) && error.contains("frame 0 of it"), "{error}");
         }
+        // What the file says of distortion holds for a frame with a focal length of its own.
+        let distorted = of(r#""k1": 0.1,"#, all).unwrap().warnings;
+        assert!(distorted.len() == 1 && distorted[0].contains("distort"), "{distorted:?}");
     }
 
     #[test]

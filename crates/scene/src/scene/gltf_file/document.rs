@@ -95,12 +95,13 @@ fn check_version(path: &Path, asset: &Asset) -> Result<()> {
 
 fn check_required(path: &Path, root: &Root) -> Result<()> {
     for name in &root.extensions_required {
-        if let Treatment::Packed | Treatment::Unknown(_) = treatment(name) {
-            let what =
-                format!("it requires {}, and the extension is not supported", shortened(name));
-            let hint = "export the file without the extension";
-            return Err(Error::unsupported(path.display(), what, hint));
-        }
+        let hint = match treatment(name) {
+            Treatment::Packed(unpack) => unpack,
+            Treatment::Unknown(_) => "export the file without the extension",
+            _ => continue,
+        };
+        let what = format!("it requires {}, and the extension is not supported", shortened(name));
+        return Err(Error::unsupported(path.display(), what, hint));
     }
     Ok(())
 }

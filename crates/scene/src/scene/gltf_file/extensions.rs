@@ -40,8 +40,8 @@ pub(super) enum Treatment {
     /// It is not read, and what is drawn is not what it asks for: in which way.
     Warned(&'static str),
     /// It packs data, and is not read: what has no other data is not drawn, and a file
-    /// that requires it is refused.
-    Packed,
+    /// that requires it is refused. How to unpack it.
+    Packed(&'static str),
     /// It may mean anything: a file that requires it is refused.
     Unknown(&'static str),
 }
@@ -59,6 +59,10 @@ const EXTENSIONS: &[(&str, Treatment)] = {
     const DIFFUSE: &str = "its materials are drawn as diffuse ones";
     const LIGHTS: &str = "the scene is lit by the capture's own lights";
     const IMAGE: &str = "its images cannot be decoded";
+    const KTX: &str =
+        "its images cannot be decoded; 'gltf-transform ktxdecompress in.glb out.glb' unpacks them";
+    const UNPACK: &str = "unpack it: gltf-transform copy in.glb out.glb";
+    const EXPORT: &str = "export the file without the extension";
     &[
         ("EXT_instance_features", Passed),
         ("EXT_lights_ies", Warned(LIGHTS)),
@@ -66,12 +70,12 @@ const EXTENSIONS: &[(&str, Treatment)] = {
         ("EXT_mesh_features", Passed),
         ("EXT_mesh_gpu_instancing", Read),
         ("EXT_mesh_manifold", Passed),
-        ("EXT_meshopt_compression", Packed),
+        ("EXT_meshopt_compression", Packed(UNPACK)),
         ("EXT_structural_metadata", Passed),
         ("EXT_texture_avif", Warned(IMAGE)),
         ("EXT_texture_webp", Read),
         ("KHR_animation_pointer", Warned("animations are not played")),
-        ("KHR_draco_mesh_compression", Packed),
+        ("KHR_draco_mesh_compression", Packed(UNPACK)),
         ("KHR_gaussian_splatting", Read),
         ("KHR_gaussian_splatting_compression_spz_2", Read),
         ("KHR_lights_punctual", Warned(LIGHTS)),
@@ -91,12 +95,12 @@ const EXTENSIONS: &[(&str, Treatment)] = {
         ("KHR_materials_volume", Warned("its attenuation is not applied")),
         ("KHR_materials_volume_scatter", Warned("its scattering is not applied")),
         ("KHR_mesh_quantization", Read),
-        ("KHR_meshopt_compression", Packed),
+        ("KHR_meshopt_compression", Packed(EXPORT)),
         ("KHR_node_hoverability", Passed),
         ("KHR_node_selectability", Passed),
         ("KHR_node_visibility", Read),
-        ("KHR_spz_gaussian_splats_compression", Packed),
-        ("KHR_texture_basisu", Warned(IMAGE)),
+        ("KHR_spz_gaussian_splats_compression", Packed(EXPORT)),
+        ("KHR_texture_basisu", Warned(KTX)),
         ("KHR_texture_transform", Read),
         ("KHR_xmp", Passed),
         ("KHR_xmp_json_ld", Passed),

@@ -260,7 +260,10 @@ impl Loader<'_> {
         let accessor = position.and_then(|p| self.root.accessors.get(*p));
         let empty = |a: &super::json::Accessor| a.buffer_view.is_none() && a.sparse.is_none();
         if primitive.extensions.has(packed) && accessor.is_none_or(empty) {
-            let what = format_args!("{packed} is not read: what it packs is not drawn");
+            let what = format_args!(
+                "{packed} is not read: what it packs is not drawn; 'gltf-transform copy in.glb \
+                 out.glb' unpacks it"
+            );
             return Some(self.warnings.matter(what));
         }
         let what = "primitives without positions are not drawn";

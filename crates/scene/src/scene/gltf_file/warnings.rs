@@ -65,7 +65,7 @@ impl Warnings {
     ) -> Vec<Matter> {
         let told = names.into_iter().filter_map(|name| match treatment(name) {
             // What is packed is told where its bytes are missed.
-            Treatment::Read | Treatment::Passed | Treatment::Packed => None,
+            Treatment::Read | Treatment::Passed | Treatment::Packed(_) => None,
             Treatment::Warned(why) | Treatment::Unknown(why) => {
                 let what = format_args!("{} is not read: {why}", shortened(name));
                 Some(self.matter_of(unit, what))

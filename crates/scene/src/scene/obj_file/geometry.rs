@@ -222,10 +222,14 @@ impl<'f, 's> Reader<'f, 's> {
             self.geometry.along.push(number);
         }
         let end = self.geometry.along.len();
-        if end < start + 2 {
-            return Err("a line has at least two points".to_string());
+        match end - start {
+            0 => return Err("the line has no points".to_string()),
+            1 => {
+                self.geometry.along.truncate(start);
+                self.points += 1;
+            }
+            _ => self.geometry.lines.push((end, statement.line)),
         }
-        self.geometry.lines.push((end, statement.line));
         Ok(())
     }
 
@@ -346,7 +350,9 @@ impl<'f, 's> Reader<'f, 's> {
         }
         if self.points > 0 {
             let n = self.points;
-            warn(format!(": {n} points and faces of fewer than three corners are not drawn"));
+            warn(format!(
+                ": {n} points, lines of one and faces of fewer than three corners are not drawn"
+            ));
         }
         if let Some(named) = self.free_form.named() {
             warn(format!(

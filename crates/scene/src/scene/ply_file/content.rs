@@ -34,7 +34,8 @@ impl<'a> File<'a> {
         let (text, rows) = content.split_at(read);
         let whole = Bytes::new(place, content);
         let header = header.map_err(|e| match e.line() {
-            _ if start.len() < content.len() && !ends(start) => {
+            // Only what begins like a header can be too long a one.
+            _ if start.len() < content.len() && start.starts_with(b"ply") && !ends(start) => {
                 let hint = "export it with a shorter one";
                 whole.unsupported("its PLY header is longer than 1 MiB", hint)
             }

@@ -10,8 +10,8 @@ use screendoor_trace::error::{Error, Result, one_line};
 /// The versions of the file format that are read: from the one on that says for
 /// each grid how it is packed (OpenVDB 3.0, 2014) to the newest known.
 const VERSIONS: std::ops::RangeInclusive<u32> = 222..=224;
-/// The only type of grid that is read: floats, in OpenVDB's usual tree.
-const FLOAT_GRID: &str = "Tree_float_5_4_3";
+/// The types of grids that are read: real numbers, in OpenVDB's usual tree; of 4 bytes and of 8.
+const REAL_GRIDS: [(&str, usize); 2] = [("Tree_float_5_4_3", 4), ("Tree_double_5_4_3", 8)];
 /// What older files append to the type of a grid of half floats.
 const HALF: &str = "_HalfFloat";
 /// What OpenVDB calls a grid of densities.
@@ -23,8 +23,10 @@ pub(super) struct Grid {
     /// What it says of its values: `level set`, `fog volume`, or anything.
     pub class: String,
     pub packing: Packing,
-    /// Whether values are stored as half floats.
-    pub half: bool,
+    /// How many bytes a value has where it stands alone, ...
+    pub wide: usize,
+    /// ... and among others: less where they are stored as half floats.
+    pub stored: usize,
     /// From voxels to the scene.
     pub place: DAffine3,
     /// Where its tree begins, and where its voxels' values begin and end.
@@ -51,18 +53,21 @@ pub(super) struct Entry {
 }
 
 impl Entry {
-    fn is_float(&self) -> bool {
-        self.kind.trim_end_matches(HALF) == FLOAT_GRID && !self.is_instance
+    /// How many bytes a number has, where it is a grid of real numbers.
+    fn real(&self) -> Option<usize> {
+        let kind = self.kind.trim_end_matches(HALF);
+        let found = REAL_GRIDS.iter().find(|(name, _)| *name == kind && !self.is_instance);
+        found.map(|(_, bytes)| *bytes)
     }
 }
 
 /// The grids that may be drawn, with their numbers among the entries; the first that holds
-/// densities is to be. They are the one of the name `wanted`, or else all of floats: that of
-/// the name `density`, those that call themselves fog volumes, the others.
+/// densities is to be. They are the one of the name `wanted`, or else all of real numbers: that
+/// of the name `density`, those that call themselves fog volumes, the others.
 ///
 /// # Errors
 /// [`Error::Config`] where there is none of the name wanted, [`Error::Unsupported`] where
-/// there is none of floats.
+/// there is none of real numbers.
 pub(super) fn candidates(
     bytes: &mut Bytes,
     entries: &[Entry],
@@ -76,13 +81,14 @@ pub(super) fn candidates(
     }
     let numbered = entries.iter().enumerate();
     let mut found: Vec<(usize, Result<Grid>)> = numbered
-        .filter(|(_, entry)| entry.is_float() && named(entry))
-        .map(|(i, entry)| (i, open(bytes, entry)))
+        .filter(|(_, entry)| named(entry))
+        .filter_map(|(i, entry)| Some((i, open(bytes, entry, entry.real()?))))
         .collect();
     if found.is_empty() {
         let all = entries.iter().filter(|e| named(e));
         let all: Vec<String> = all.map(|e| format!("'{}' of {}", e.name, e.kind)).collect();
-        let what = format!("it has no grid of {FLOAT_GRID} (it has: {})", all.join(", "));
+        let kinds = REAL_GRIDS.map(|(name, _)| name).join(" or ");
+        let what = format!("it has no grid of {kinds} (it has: {})", all.join(", "));
         return Err(bytes.unsupported(what, "save the density as a float grid"));
     }
     found.sort_by_key(|(i, grid)| match grid {
@@ -94,7 +100,7 @@ pub(super) fn candidates(
 }
 
 /// Reads what stands before a grid's tree.
-fn open(bytes: &mut Bytes, entry: &Entry) -> Result<Grid> {
+fn open(bytes: &mut Bytes, entry: &Entry, wide: usize) -> Result<Grid> {
     bytes.seek(entry.grid)?;
     let flags = bytes.u32()?;
     let Some(packing) = Packing::from_flags(flags) else {
@@ -103,11 +109,13 @@ fn open(bytes: &mut Bytes, entry: &Entry) -> Result<Grid> {
     let metadata = metadata(bytes)?;
     let entry_of = |name: &str| metadata.iter().find(|(n, _)| n == name).map(|(_, value)| *value);
     let class = String::from_utf8_lossy(entry_of("class").unwrap_or(b"")).into_owned();
+    let half = entry_of("is_saved_as_half_float").is_some_and(|v| v.iter().any(|b| *b != 0));
     Ok(Grid {
         name: entry.name.clone(),
         class,
         packing,
-        half: entry_of("is_saved_as_half_float").is_some_and(|v| v.iter().any(|b| *b != 0)),
+        wide,
+        stored: if half { 2 } else { wide },
         place: place(bytes)?,
         tree: bytes.at() as u64,
         blocks: entry.blocks,

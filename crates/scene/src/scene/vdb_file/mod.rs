@@ -36,7 +36,7 @@ const SIZE: f32 = 1.25;
 const LEAST_SHARE: f32 = 0.03;
 
 /// Loads the VDB file at `path`: of its grids that of the name `wanted`, or else that of
-/// the name `density`, the first fog volume, or the first of floats. Level sets are passed
+/// the name `density`, the first fog volume, or the first of real numbers. Level sets are passed
 /// over, whether they say that they are some or only hold distances.
 pub(super) fn load(path: &Path, wanted: Option<&str>) -> Result<Scene> {
     let content = file::read(path)?;

@@ -95,11 +95,11 @@ impl<'a> Reader<'_, 'a> {
             let what = format_args!("its tree has {buffers} buffers, and 1 is read");
             return Err(self.bytes.unsupported(what, "save the grid alone"));
         }
-        self.background = self.bytes.f32()?;
+        self.background = self.number()?;
         let (tiles, children) = (self.bytes.u32()?, self.bytes.u32()?);
         for _ in 0..tiles {
             let corner = self.corner()?;
-            let density = self.bytes.f32()?;
+            let density = self.number()?;
             if self.bytes.u8()? != 0 {
                 self.tile(corner, UPPER + LOWER + LEAF, density)?;
             }
@@ -109,6 +109,14 @@ impl<'a> Reader<'_, 'a> {
             self.upper(corner)?;
         }
         Ok(())
+    }
+
+    /// A value that stands alone, as the nearest of single precision.
+    fn number(&mut self) -> Result<f32> {
+        match self.grid.wide {
+            8 => Ok(self.bytes.f64()? as f32),
+            _ => self.bytes.f32(),
+        }
     }
 
     fn corner(&mut self) -> Result<Corner> {
@@ -212,22 +220,23 @@ impl<'a> Reader<'_, 'a> {
                 return Err(self.bytes.bad(what));
             }
         };
-        self.bytes.take(4 * values)?;
+        self.bytes.take(self.grid.wide * values)?;
         if (3..=5).contains(&inactive) {
             Mask::read(self.bytes, dimension)?;
         }
         let packed = self.grid.packing.active_only() && inactive != 6;
         let count = if packed { active.count() } else { 1 << (3 * dimension) };
-        let size = if self.grid.half { 2 } else { 4 };
+        let size = self.grid.stored;
         // Of half floats an empty block is not even announced.
         let block = match count {
-            0 if self.grid.half => Vec::new(),
+            0 if size == 2 => Vec::new(),
             _ => self.grid.packing.read(self.bytes, size * count)?,
         };
         let value = |i: usize| match block[size * i..][..size] {
             [a, b] => f16::from_le_bytes([a, b]).to_f32(),
             [a, b, c, d] => f32::from_le_bytes([a, b, c, d]),
-            _ => unreachable!("values have 2 or 4 bytes"),
+            [a, b, c, d, e, f, g, h] => f64::from_le_bytes([a, b, c, d, e, f, g, h]) as f32,
+            _ => unreachable!("values have 2, 4 or 8 bytes"),
         };
         let places = active.iter().enumerate();
         Ok(places.map(|(k, i)| (i, value(if packed { k } else { i }))).collect())
