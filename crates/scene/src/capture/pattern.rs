@@ -113,7 +113,7 @@ pub fn pattern(kind: PatternKind, samples: u32) -> Result<SamplePattern> {
         PatternKind::Standard if samples > 16 => {
             return Err(Error::config(
                 format_args!("there is no standard pattern of {samples} samples"),
-                "ask for at most 16, or for --pattern nested",
+                "ask for at most 16, or for the pattern 'nested'",
             ));
         }
         PatternKind::Standard => false,

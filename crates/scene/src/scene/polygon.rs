@@ -21,11 +21,13 @@ use screendoor_trace::random::Stream;
 const MAX_CORNERS: usize = 1 << 16;
 /// Crossings of edges times corners, of all polygons of a scene: what finding the edges takes.
 const MAX_WORK: f64 = (1_u64 << 26) as f64;
-/// So many edges that the sweep over a polygon keeps beside a corner take as long: a polygon of
-/// [`MAX_CORNERS`] with all of its edges side by side is cut, a second one of them is not.
-const KEPT_EDGES: f64 = 64.0;
 /// Pairs of edges for each corner that are looked at to estimate how many cross.
 const PAIRS: usize = 64;
+/// An edge that the sweep over a polygon keeps beside a corner takes as long as so many of these,
+/// at the worst.
+const KEPT_EDGE: f64 = 4.0;
+/// Where a sweep along x keeps more, it is looked at whether one along y keeps fewer.
+const MANY_KEPT: f64 = (1_u64 << 20) as f64;
 /// Steps of the lattice on which polygons are cut, along the longer side of their box.
 const STEPS: f64 = (1_u64 << 40) as f64;
 /// A part of a polygon's area that may be covered twice.
@@ -69,14 +71,22 @@ impl Cutter {
         if points.len() <= 3 {
             return Ok(fan());
         }
-        let Some(flat) = flattened(points) else { return Ok(fan()) };
+        let Some(mut flat) = flattened(points) else { return Ok(fan()) };
         if is_fan(&flat) {
             return Ok(fan());
         }
         if flat.len() > MAX_CORNERS {
             return Err(TooComplex);
         }
-        self.left -= crossings(&flat) * (flat.len() + PAIRS) as f64 + swept(&flat) / KEPT_EDGES;
+        let mut kept = kept(&flat);
+        if kept > MANY_KEPT {
+            let turned: Vec<DVec2> = flat.iter().map(|p| DVec2::new(p.y, -p.x)).collect();
+            let other = self::kept(&turned);
+            if other < kept {
+                (flat, kept) = (turned, other);
+            }
+        }
+        self.left -= crossings(&flat) * (flat.len() + PAIRS) as f64 + kept * KEPT_EDGE;
         if self.left < 0.0 { Err(TooComplex) } else { Ok(cut(&flat)) }
     }
 }
@@ -158,7 +168,7 @@ fn crossings(flat: &[DVec2]) -> f64 {
 
 /// How many edges a sweep along x keeps, at all corners together: for each edge, the corners
 /// between its ends.
-fn swept(flat: &[DVec2]) -> f64 {
+fn kept(flat: &[DVec2]) -> f64 {
     let mut all: Vec<f64> = flat.iter().map(|p| p.x).collect();
     all.sort_unstable_by(f64::total_cmp);
     let before = |x: f64| all.partition_point(|other| *other < x);
@@ -394,14 +404,29 @@ mod tests {
         let some = polygon(&wild[..200]);
         let done = (0..1000).take_while(|_| cutter.triangulate(&some).is_ok()).count();
         assert!((1..1000).contains(&done), "{done}");
-        // Nor do many whose edges, though they do not cross, all lie side by side.
-        let teeth = |i: u32| [f64::from(i % 2) * 1e4, f64::from(i)];
-        let mut long: Vec<[f64; 2]> = (0..20_000).map(teeth).collect();
-        long.extend([[3e4, 2e4], [3e4, -1.0]]);
-        let long = polygon(&long);
-        let mut cutter = Cutter::default();
-        let done = (0..20).take_while(|_| cutter.triangulate(&long).is_ok()).count();
-        assert!((5..20).contains(&done), "{done}");
+        // Nor many edges side by side, though they do not cross, that run along neither axis.
+        let teeth = |count: u32, turn: f64| -> Vec<DVec3> {
+            let side = f64::from(count);
+            let tooth = |i: u32| [f64::from(i % 2) * side, f64::from(i)];
+            let mut ring: Vec<[f64; 2]> = (0..count).map(tooth).collect();
+            ring.extend([[3.0 * side, side], [3.0 * side, -1.0]]);
+            let turn = glam::DQuat::from_rotation_z(turn);
+            polygon(&ring).into_iter().map(|p| turn * p).collect()
+        };
+        assert_eq!(triangulate(&teeth(20_000, 0.7)), Err(TooComplex));
+        let (mut cutter, few) = (Cutter::default(), teeth(2000, 0.7));
+        let done = (0..100).take_while(|_| cutter.triangulate(&few).is_ok()).count();
+        assert!((1..100).contains(&done), "{done}");
+        // Along an axis there is a way to sweep that keeps few.
+        for turn in [0.0, std::f64::consts::FRAC_PI_2] {
+            for upside_down in [false, true] {
+                let mut teeth = teeth(20_000, turn);
+                if upside_down {
+                    teeth.reverse();
+                }
+                assert_eq!(triangulate(&teeth).unwrap().len(), teeth.len() - 2);
+            }
+        }
         // As many corners that do not cross are cut.
         let comb: Vec<[f64; 2]> = (0..20_000_u32)
             .map(|i| {

@@ -447,10 +447,8 @@ impl SceneEntry {
                 "give one of the two",
             ));
         }
-        let sides = self.size.iter().flatten();
-        if let Some([w, h]) =
-            self.size.filter(|_| sides.clone().any(|side| !(1..=MAX_SIDE).contains(side)))
-        {
+        let cannot = |size: &[u32; 2]| size.iter().any(|side| !(1..=MAX_SIDE).contains(side));
+        if let Some([w, h]) = self.size.filter(cannot) {
             return Err(out_of_range("size", format_args!("{w}, {h}"), "1 to 65536 pixels a side"));
         }
         if !SamplePattern::is_count(self.captured_samples) {
