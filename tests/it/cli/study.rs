@@ -551,7 +551,7 @@ fn what_of_a_scene_is_not_drawn_is_told_by_a_study_too() {
         serde_json::from_slice::<Value>(&bytes).unwrap()["warnings"].clone()
     };
     let told = facts();
-    assert!(told[0].as_str().unwrap().contains("points and lines are not drawn"), "{told}");
+    assert!(told[0].as_str().unwrap().contains("1 lines beside surfaces are not drawn"), "{told}");
     let page = fs::read_to_string(place.path("out/report.html")).unwrap();
     assert!(page.contains("Not drawn of glass"));
     // As where the process ended between the trace and its facts.

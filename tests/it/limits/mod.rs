@@ -10,10 +10,12 @@ use std::path::Path;
 use crate::edits;
 use crate::measured::{Run, commands};
 use crate::util::header;
+use screendoor::trace::WriteOptions;
 
-/// Writes a trace of so many fragments on a frame of 256 x 256 pixels.
-pub fn many_pixels(path: &Path, fragments: u32) {
-    traces::write(path, &header(256, 256, 4), fragments, traces::many);
+/// Writes a trace of so many fragments of one alpha on a frame of 256 x 256 pixels.
+pub fn many_pixels(path: &Path, fragments: u32, alpha: f32) {
+    let fragment = |i| (traces::many(i), alpha);
+    traces::write_with(path, &header(256, 256, 4), fragments, fragment, WriteOptions::default());
 }
 
 /// A command, and tests of it.

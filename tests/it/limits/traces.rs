@@ -25,7 +25,7 @@ pub(super) fn write(path: &Path, header: &Header, count: u32, pixel: impl Fn(u32
 }
 
 /// As [`write`], with alphas.
-fn write_with(
+pub(super) fn write_with(
     path: &Path,
     header: &Header,
     count: u32,
