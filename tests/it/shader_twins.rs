@@ -113,7 +113,7 @@ impl Example {
 
     /// Compiles a shader of `docs/capture` from GLSL.
     fn glsl(&self, name: &str) -> PathBuf {
-        let path = self.folder.path().join(name).with_extension("spv");
+        let path = self.folder.path().join(format!("{name}.spv"));
         let include = format!("-I{}", place("crates/gpu/src/shaders").display());
         let output = Command::new(std::env::var("GLSLANG").unwrap_or("glslangValidator".into()))
             .args(["-V", &include])
