@@ -102,7 +102,10 @@ fn lines_in_places_of_several_sizes_are_of_one_width() {
 #[test]
 fn lines_that_cannot_be_are_refused() {
     let refused = |text: &str, width| loaded("a.obj", text.as_bytes(), width).unwrap_err();
-    assert!(refused("v 0 0 0\nv 1 0 0\nl 1 3\n", None).contains("line 3 ('l 1 3'): vertex 3 is not there"));
+    assert!(
+        refused("v 0 0 0\nv 1 0 0\nl 1 3\n", None)
+            .contains("line 3 ('l 1 3'): vertex 3 is not there")
+    );
     assert!(refused("v 0 0 0\nl\n", None).contains("the line has no points"));
     assert!(refused("v 0 0 0\nv 0 0 0\nl 1 2\n", None).contains("lines of no extent"));
     assert!(refused("v 0 0 0\nv 1 0 0\nl 1 x\n", None).contains("line 3"));
