@@ -13,7 +13,8 @@ use crate::edit::{
 use crate::error::Result;
 use crate::trace::{ColumnId, ColumnKind, Scalar, Trace};
 
-/// Compare two traces fragment by fragment; ends with 3 where a replay can tell them apart
+/// Compare two traces fragment by fragment; ends with 3 where anything differs that a replay can
+/// depend on
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     /// A trace
@@ -57,16 +58,16 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         header,
         fragments,
     };
-    report(json, "screendoor.diff", &document, console, || print(&document, console))?;
+    // Before it is printed: who reads no further is told by the program's end all the same.
     if !document.same {
         console.differ();
     }
-    Ok(())
+    report(json, "screendoor.diff", &document, console, || print(&document, console))
 }
 
 fn print(document: &Document, console: &Console) -> Result<()> {
     let line =
-        |name: &str, value: String| console.print(format_args!("{name:<18}{}", shown(value)));
+        |name: &str, value: String| console.print(format_args!("{name:<17} {}", shown(value)));
     for HeaderDifference { entry, values: [a, b], .. } in &document.header {
         line(entry, format!("{a} | {b}"))?;
     }
@@ -92,6 +93,15 @@ fn print(document: &Document, console: &Console) -> Result<()> {
     if let Some(first) = &found.first {
         line("first", told(first))?;
     }
+    let comparable = found.pixels - found.counts;
+    if found.counts > 0 || found.compared < comparable {
+        let [compared, all] = [found.compared, comparable].map(grouped);
+        let memory = if found.compared < comparable { "; more take more --memory" } else { "" };
+        line(
+            "columns",
+            format!("of {compared} of the {all} pixels that have as many in both{memory}"),
+        )?;
+    }
     for column in &found.columns {
         let (fragments, most) = (grouped(column.fragments), column.most);
         let unit = if column.column == ColumnId::Coverage.name() { " samples" } else { "" };
@@ -99,12 +109,6 @@ fn print(document: &Document, console: &Console) -> Result<()> {
             &format!("  {}", column.column),
             format!("differs in {fragments} fragments, by {most}{unit} at most"),
         )?;
-    }
-    let comparable = found.pixels - found.counts;
-    if found.compared < comparable {
-        let [compared, all] = [found.compared, comparable].map(grouped);
-        let which = "pixels that have as many fragments in both: more need more --memory";
-        line("", format!("(columns of {compared} of the {all} {which})"))?;
     }
     console.print(format_args!(
         "{}",

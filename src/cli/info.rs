@@ -163,7 +163,9 @@ fn print(trace: &Trace, stats: &Statistics, console: &Console) -> Result<()> {
     if let Some([near, far]) = stats.depth {
         line("depth", format!("{near:.6} to {far:.6} of the range"))?;
     }
-    line("primitives", format!("numbered up to {}", grouped(stats.primitives)))?;
+    let last = stats.primitives.checked_sub(1);
+    let numbered = last.map_or("none".to_string(), |n| format!("numbered up to {}", grouped(n)));
+    line("primitives", numbered)?;
     let more = if stats.objects.more { "more than " } else { "" };
     line("objects", format!("{more}{}", grouped(stats.objects.count as u64)))?;
     console.print(format_args!("  fragments of the largest objects, by number"))?;

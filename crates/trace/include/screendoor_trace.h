@@ -906,18 +906,19 @@ static bool screendoor_i_header(screendoor_trace *trace, const screendoor_header
 
 screendoor_trace *screendoor_trace_open(const char *path, const screendoor_header *header) {
     screendoor_trace *trace = (screendoor_trace *)calloc(1, sizeof *trace);
-    const size_t length = strlen(path);
+    const size_t length = strlen(path == NULL ? "" : path);
     FILE *old;
     size_t i;
     if (trace == NULL) return NULL;
     trace->path = (char *)malloc(2 * length + sizeof "..partial");
     if (trace->path == NULL) return free(trace), (screendoor_trace *)NULL;
     trace->partial = trace->path + length + 1;
-    memcpy(trace->path, path, length + 1);
-    memcpy(trace->partial, path, length);
+    memcpy(trace->path, path == NULL ? "" : path, length + 1);
+    memcpy(trace->partial, trace->path, length);
     memcpy(trace->partial + length, ".partial", sizeof ".partial");
     trace->width = header->width, trace->height = header->height;
     trace->samples = header->samples, trace->sealed = !header->unsealed;
+    if (length == 0) return screendoor_i_fail(trace, "no path is given"), trace;
     if (!screendoor_i_header(trace, header)) return trace;
 
     for (i = 0; i < SCREENDOOR_I_COLUMNS; i++) {

@@ -64,6 +64,15 @@ fn what_is_stored_otherwise_says_the_same() {
     let text = String::from_utf8(output.stdout).unwrap();
     assert_eq!(output.status.code(), Some(3));
     assert!(text.contains("half precision | single precision"), "{text}");
+    // A reader that wants no more changes nothing of how the program ends.
+    let mut child = std::process::Command::new(super::PROGRAM)
+        .args(["diff", "t.arrow", "c.arrow"])
+        .current_dir(place.path("."))
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    assert_eq!(child.wait().unwrap().code(), Some(3));
     assert!(text.contains("the same fragments under headers that differ"), "{text}");
     // Back to halves nothing is lost, and nothing is said.
     place.good(&["convert", "c.arrow", "-o", "d.arrow", "--half-colour"]);

@@ -31,7 +31,7 @@ impl<'a> Merge<'a> {
     /// space of colours differ.
     pub fn new(traces: &'a [Trace], options: MergeOptions) -> Result<Self> {
         let Some((first, others)) = traces.split_first() else {
-            return Err(Error::config("there is nothing to merge", "name at least one trace"));
+            return Err(Error::config("there is nothing to join", "name at least one trace"));
         };
         let mut header = first.header().clone();
         for trace in others {
@@ -48,7 +48,7 @@ impl<'a> Merge<'a> {
             if let Some((what, _)) = differs.into_iter().find(|(_, differs)| *differs) {
                 return Err(Error::config(
                     format_args!("{} and {} differ in their {what}", first.place(), trace.place()),
-                    "merge traces of one frame, its samples, its background and its space",
+                    "join traces of one frame, its samples, its background and its space",
                 ));
             }
             header.pattern.nested &= other.pattern.nested;

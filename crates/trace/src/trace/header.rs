@@ -122,6 +122,9 @@ pub struct Header {
     pub optional: BTreeSet<ColumnId>,
 }
 
+/// The key of the space of colours.
+pub(super) const SPACE: &str = key::SPACE;
+
 const DEPTH_CONVENTION: &str = "unorm32 near=0 far=4294967295 less-equal";
 
 /// The metadata keys of the format, all under one prefix.

@@ -283,7 +283,11 @@ impl BatchLayout {
                 return Err(bad("has another length"));
             }
             if nodes[i].null_count() != 0 {
-                return Err(bad("has nulls"));
+                return Err(Error::invalid(
+                    place,
+                    format_args!("its column '{name}' has nulls among its values of {stored}"),
+                    "fill them when writing, or leave out the rows that have them",
+                ));
             }
             // Validity first; no array of a column of ours has other buffers.
             let first = column.place.buffer(&views).expect("no more than all have");

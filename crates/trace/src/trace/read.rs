@@ -18,7 +18,7 @@ use crate::trace::cells::Source;
 use crate::trace::column::ValueType;
 use crate::trace::columns::ColumnId;
 use crate::trace::content::ContentHasher;
-use crate::trace::header::Header;
+use crate::trace::header::{Header, SPACE};
 use crate::trace::layout::{BatchLayout, Block, Layout};
 use crate::trace::seal::{CHECKSUMS, CHECKSUMS_KIND, Seal, damaged};
 use crate::trace::stored::StoredColumns;
@@ -250,10 +250,13 @@ impl Trace {
         &self.inner.stored.extra
     }
 
-    /// The keys of its metadata that are not the format's, but other programs'.
+    /// The keys of its metadata that are not the format's, but other programs' or a later
+    /// version's.
     pub fn extra_metadata(&self) -> impl Iterator<Item = &str> {
+        let own = self.inner.header.to_metadata();
         let keys = self.inner.metadata.keys().map(String::as_str);
-        keys.filter(|key| !key.starts_with("screendoor."))
+        // What is meant where it is not said may be said.
+        keys.filter(move |key| ![CHECKSUMS, SPACE].contains(key) && !own.contains_key(*key))
     }
 
     /// The columns that are stored in another type than they are read as: name, the type in

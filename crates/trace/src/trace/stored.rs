@@ -150,7 +150,7 @@ impl StoredColumns {
             }
             let Some(stored) = StoredType::of_field(field) else {
                 let what = format_args!("is of type {}", type_name(field)).to_string();
-                return Err(unreadable(place, name, &what, &wanted(id, None)));
+                return Err(unreadable(place, name, &what, &wanted(id, None, None)));
             };
             columns.list.push(StoredColumn { id, stored, place: here });
         }
@@ -181,7 +181,8 @@ impl StoredColumns {
         let read = |column: &StoredColumn| {
             let value_type = column.stored.read_as(column.id, samples).ok_or_else(|| {
                 let what = format!("is of type {}", column.stored);
-                unreadable(place, column.id.name(), &what, &wanted(column.id, Some(samples)))
+                let hint = wanted(column.id, Some(samples), Some(column.stored));
+                unreadable(place, column.id.name(), &what, &hint)
             })?;
             Ok((column.id, value_type))
         };
@@ -221,7 +222,7 @@ impl StoredColumn {
             Error::invalid(
                 format_args!("{place}, row {row}"),
                 format_args!("column '{name}' holds {value} as {}, which no {to} is", self.stored),
-                format_args!("cast the column to {to} when writing"),
+                format_args!("write numbers that are {to}, in the format's unit"),
             )
         })
     }
@@ -324,14 +325,24 @@ fn type_name(field: Field<'_>) -> String {
     name.trim_end_matches('_').to_lowercase()
 }
 
-/// What to do about a column of a wrong type.
-fn wanted(id: ColumnId, samples: Option<u32>) -> String {
+/// What to do about a column of a wrong type. A cast alone would make another value of what
+/// counts in another unit.
+fn wanted(id: ColumnId, samples: Option<u32>, stored: Option<StoredType>) -> String {
     let types: Vec<String> = ValueType::ALL
         .into_iter()
         .filter(|t| id.accepts(*t, samples.unwrap_or(1)))
         .map(|t| t.to_string())
         .collect();
-    format!("cast it to {}", types.join(" or "))
+    let first = match (id.kind(), stored) {
+        (ColumnKind::Real, Some(StoredType::Unsigned(_) | StoredType::Signed(_))) => {
+            "divide it by what 1 is in it, 255 perhaps, and "
+        }
+        (ColumnKind::Whole, Some(StoredType::Real(_))) => {
+            "scale it to the format's unit, round it, and "
+        }
+        _ => "",
+    };
+    format!("{first}cast it to {}", types.join(" or "))
 }
 
 fn unreadable(place: &str, name: &str, what: &str, hint: &str) -> Error {
