@@ -211,7 +211,7 @@ fn what_would_be_a_guess_or_a_loss_is_refused_by_name() {
     let numbers = |value, rest| Int64Array::from(once(value, rest));
     let reals = |value, rest| Float64Array::from(once(value, rest));
     let cases: Vec<(Vec<u8>, &[&str])> = vec![
-        (with("x", numbers(-1, 1)), &["row 5", "'x' holds -1 as int64", "cast", "uint16"]),
+        (with("x", numbers(-1, 1)), &["row 5", "'x' holds -1 as int64", "numbers that are uint16"]),
         (with("y", numbers(65536, 1)), &["row 5", "'y' holds 65536"]),
         (with("z", numbers(1 << 32, 1)), &["row 5", "'z' holds 4294967296", "no uint32"]),
         (with("z", numbers(-1, 1)), &["row 5", "'z' holds -1"]),
