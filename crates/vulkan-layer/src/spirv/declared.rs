@@ -1,0 +1,309 @@
+//! What a module declares before its functions, as far as it matters here.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::module::{Instruction, Module, Result};
+use super::spec::{decoration, op, version};
+
+/// A type; others than these are left alone.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Type {
+    Void,
+    Bool,
+    Int { width: u32 },
+    Float { width: u32 },
+    Vector { of: u32, n: u32 },
+    Matrix { of: u32, n: u32 },
+    Array { of: u32, length: u32 },
+    Struct { members: Vec<u32> },
+    Pointer { class: u32, to: u32 },
+    Function { returns: u32, parameters: usize },
+}
+
+impl Type {
+    /// Result id and type of an instruction that declares one of these.
+    fn parse(instruction: &Instruction) -> Result<Option<(u32, Self)>> {
+        let at = |n| instruction.operand(n);
+        let ty = match instruction.op() {
+            op::TYPE_VOID => Self::Void,
+            op::TYPE_BOOL => Self::Bool,
+            op::TYPE_INT => Self::Int { width: at(1)? },
+            // A third operand says that it is no IEEE number (bfloat16).
+            op::TYPE_FLOAT if instruction.operands().len() == 2 => Self::Float { width: at(1)? },
+            op::TYPE_VECTOR => Self::Vector { of: at(1)?, n: at(2)? },
+            op::TYPE_MATRIX => Self::Matrix { of: at(1)?, n: at(2)? },
+            op::TYPE_ARRAY => Self::Array { of: at(1)?, length: at(2)? },
+            op::TYPE_STRUCT => {
+                at(0)?;
+                Self::Struct { members: instruction.operands()[1..].to_vec() }
+            }
+            op::TYPE_POINTER => Self::Pointer { class: at(1)?, to: at(2)? },
+            op::TYPE_FUNCTION => {
+                Self::Function { returns: at(1)?, parameters: instruction.operands().len() - 2 }
+            }
+            _ => return Ok(None),
+        };
+        Ok(Some((at(0)?, ty)))
+    }
+
+    /// Whether two of a kind may not be declared: the other kinds differ by their decorations.
+    fn is_unique(&self) -> bool {
+        !matches!(self, Self::Array { .. } | Self::Struct { .. })
+    }
+}
+
+/// A variable outside of functions.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Variable {
+    pub(super) class: u32,
+    /// The type that is pointed to.
+    pub(super) to: u32,
+}
+
+/// What is decorated: an id, or a member of a structure.
+type Place = (u32, Option<u32>);
+
+/// What a module declares.
+#[derive(Debug, Default)]
+pub(super) struct Declared {
+    pub(super) types: BTreeMap<u32, Type>,
+    /// Ids of types in the order of their declaration: each is made of earlier ones.
+    pub(super) order: Vec<u32>,
+    /// Constants of 32-bit integers. Specialization constants are not among them: their value is
+    /// not known before the pipeline is made.
+    pub(super) integers: BTreeMap<u32, u32>,
+    /// Instructions that declare unique types or constants, without their result, to that.
+    pub(super) known: BTreeMap<Vec<u32>, u32>,
+    pub(super) variables: BTreeMap<u32, Variable>,
+    decorations: BTreeMap<(Place, u32), u32>,
+    /// Decoration groups of what is decorated.
+    groups: BTreeMap<Place, Vec<u32>>,
+    /// Which member of a structure is this built-in.
+    built_in_members: BTreeMap<(u32, u32), u32>,
+    /// Structures with a member that is interpolated for each sample.
+    sampled: BTreeSet<u32>,
+    pub(super) capabilities: BTreeSet<u32>,
+}
+
+impl Declared {
+    pub(super) fn new(module: &Module) -> Result<Self> {
+        let mut declared = Self::default();
+        for instruction in module.declarations() {
+            declared.take(instruction)?;
+        }
+        // New ids begin at the bound.
+        let Self { types, known, variables, .. } = &declared;
+        let ids = types.keys().chain(known.values()).chain(variables.keys());
+        if ids.into_iter().any(|id| *id >= module.header[3]) {
+            return Err("the module has ids that its header says it has not".into());
+        }
+        Ok(declared)
+    }
+
+    fn take(&mut self, i: &Instruction) -> Result<()> {
+        let at = |n| i.operand(n);
+        let operands = i.operands();
+        match i.op() {
+            op::CAPABILITY => {
+                self.capabilities.insert(at(0)?);
+            }
+            op::DECORATE => self.decorate((at(0)?, None), at(1)?, operands.get(2)),
+            op::MEMBER_DECORATE => {
+                let (id, member, decoration) = (at(0)?, at(1)?, at(2)?);
+                self.decorate((id, Some(member)), decoration, operands.get(3));
+                self.note_member(id, member, decoration, operands.get(3).copied().unwrap_or(0));
+            }
+            op::GROUP_DECORATE => {
+                let group = at(0)?;
+                for target in &operands[1..] {
+                    self.groups.entry((*target, None)).or_default().push(group);
+                }
+            }
+            op::GROUP_MEMBER_DECORATE => {
+                let group = at(0)?;
+                for pair in operands[1..].chunks_exact(2) {
+                    let (id, member) = (pair[0], pair[1]);
+                    self.groups.entry((id, Some(member))).or_default().push(group);
+                    for noted in [decoration::BUILT_IN, decoration::SAMPLE] {
+                        if let Some(value) = self.decorations.get(&((group, None), noted)) {
+                            self.note_member(id, member, noted, *value);
+                        }
+                    }
+                }
+            }
+            op::CONSTANT => {
+                let (ty, id, value) = (at(0)?, at(1)?, at(2)?);
+                if operands.len() == 3 {
+                    if self.types.get(&ty) == Some(&Type::Int { width: 32 }) {
+                        self.integers.entry(id).or_insert(value);
+                    }
+                    self.known.entry(vec![op::CONSTANT, ty, value]).or_insert(id);
+                }
+            }
+            op::VARIABLE => {
+                let (pointer, id, class) = (at(0)?, at(1)?, at(2)?);
+                if let Some(Type::Pointer { to, .. }) = self.types.get(&pointer) {
+                    let variable = Variable { class, to: *to };
+                    self.variables.entry(id).or_insert(variable);
+                }
+            }
+            _ => {
+                if let Some((id, ty)) = Type::parse(i)?
+                    && !self.types.contains_key(&id)
+                {
+                    if ty.is_unique() {
+                        let key = [&[i.op()], &operands[1..]].concat();
+                        self.known.entry(key).or_insert(id);
+                    }
+                    self.types.insert(id, ty);
+                    self.order.push(id);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn decorate(&mut self, place: Place, decoration: u32, value: Option<&u32>) {
+        let value = value.copied().unwrap_or(0);
+        self.decorations.entry((place, decoration)).or_insert(value);
+    }
+
+    /// Keeps what is asked of a structure's members, so that nobody has to go through them.
+    fn note_member(&mut self, id: u32, member: u32, decoration: u32, value: u32) {
+        match decoration {
+            decoration::BUILT_IN => {
+                self.built_in_members.entry((id, value)).or_insert(member);
+            }
+            decoration::SAMPLE => {
+                self.sampled.insert(id);
+            }
+            _ => {}
+        }
+    }
+
+    fn decorated(&self, place: Place, decoration: u32) -> Option<u32> {
+        let own = self.decorations.get(&(place, decoration));
+        own.copied().or_else(|| {
+            let groups = self.groups.get(&place)?;
+            groups.iter().find_map(|g| self.decorations.get(&((*g, None), decoration)).copied())
+        })
+    }
+
+    /// A decoration's first operand, or 0 where it has none.
+    pub(super) fn decoration(&self, id: u32, decoration: u32) -> Option<u32> {
+        self.decorated((id, None), decoration)
+    }
+
+    /// The same of a member of a structure.
+    pub(super) fn member_decoration(&self, id: u32, member: u32, decoration: u32) -> Option<u32> {
+        self.decorated((id, Some(member)), decoration)
+    }
+
+    /// Which member of a structure is built in so.
+    pub(super) fn built_in_member(&self, id: u32, which: u32) -> Option<u32> {
+        self.built_in_members.get(&(id, which)).copied()
+    }
+
+    /// Whether a member of a structure is interpolated for each sample.
+    pub(super) fn samples(&self, id: u32) -> bool {
+        self.sampled.contains(&id)
+    }
+
+    /// Every value that a decoration has in the module.
+    pub(super) fn values(&self, decoration: u32) -> impl Iterator<Item = u32> {
+        self.decorations.iter().filter(move |((_, d), _)| *d == decoration).map(|(_, v)| *v)
+    }
+
+    pub(super) fn ty(&self, id: u32) -> Option<&Type> {
+        self.types.get(&id)
+    }
+
+    /// Of what a vector is made, and how much of it; a scalar is made of one of itself.
+    pub(super) fn components(&self, id: u32) -> Option<(&Type, u32)> {
+        match self.ty(id)? {
+            Type::Vector { of, n } => Some((self.ty(*of)?, *n)),
+            ty @ (Type::Bool | Type::Int { .. } | Type::Float { .. }) => Some((ty, 1)),
+            _ => None,
+        }
+    }
+}
+
+/// An entry point and what it can see.
+#[derive(Debug)]
+pub(super) struct Entry {
+    /// Which instruction declares it.
+    pub(super) at: usize,
+    pub(super) function: u32,
+    pub(super) name: Vec<u32>,
+    /// Variables as they are listed.
+    pub(super) listed: Vec<u32>,
+    /// Inputs and outputs among them, each once.
+    pub(super) interface: BTreeSet<u32>,
+    /// Those that appear in a function.
+    pub(super) used: BTreeSet<u32>,
+}
+
+impl Entry {
+    pub(super) fn find(
+        module: &Module,
+        declared: &Declared,
+        model: u32,
+        entry: &str,
+    ) -> Result<Self> {
+        let (at, (function, listed)) = module
+            .declarations()
+            .iter()
+            .enumerate()
+            .find_map(|(n, i)| Some((n, named(i, model, entry)?)))
+            .ok_or_else(|| format!("the module has no entry point '{entry}' of this stage"))?;
+        let interface: BTreeSet<u32> =
+            listed.iter().copied().filter(|id| declared.variables.contains_key(id)).collect();
+        let used = module
+            .bodies()
+            .iter()
+            .flat_map(Instruction::ids)
+            .filter(|id| interface.contains(id))
+            .collect();
+        let entry = Self {
+            at,
+            function,
+            name: super::module::string_words(entry.as_bytes()),
+            listed: listed.to_vec(),
+            interface,
+            used,
+        };
+        entry.check(module, declared)?;
+        Ok(entry)
+    }
+
+    /// It is called by the new one, so that it has to be what an entry point has to be.
+    fn check(&self, module: &Module, declared: &Declared) -> Result<()> {
+        let function = module
+            .bodies()
+            .iter()
+            .find(|i| i.op() == op::FUNCTION && i.operand(1) == Ok(self.function))
+            .ok_or("the entry point's function is missing")?;
+        let returns = match declared.ty(function.operand(3)?) {
+            Some(Type::Function { returns, parameters: 0 }) => declared.ty(*returns),
+            _ => None,
+        };
+        if returns != Some(&Type::Void) {
+            return Err("the entry point's function takes or returns something".into());
+        }
+        Ok(())
+    }
+}
+
+/// Function and listed variables of an entry point of this stage and name.
+fn named<'a>(i: &Instruction<'a>, model: u32, entry: &str) -> Option<(u32, &'a [u32])> {
+    if i.op() != op::ENTRY_POINT || i.operand(0) != Ok(model) {
+        return None;
+    }
+    let (name, listed) = super::module::string(i.operands().get(2..)?)?;
+    (name == entry.as_bytes()).then_some((i.operand(1).ok()?, listed))
+}
+
+/// Whether entry points list all variables, and not inputs and outputs alone.
+pub(super) fn lists_all(module: &Module) -> bool {
+    module.version() >= version::V1_4
+}
