@@ -2,6 +2,7 @@
 
 use std::ffi::CStr;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 use ash::vk::{self, Handle};
 
@@ -44,6 +45,8 @@ pub(crate) struct Commands {
     pub dynamic: Dynamic,
     pub sets: Sets,
     pub open: Option<Open>,
+    /// It is run once, before anything is captured: its draws are the program's own.
+    pub plain: bool,
     labels: Vec<String>,
 }
 
@@ -146,8 +149,13 @@ pub(crate) unsafe extern "system" fn begin(
     info: *const vk::CommandBufferBeginInfo<'_>,
 ) -> vk::Result {
     let Some(d) = (unsafe { device(buffer) }) else { return vk::Result::ERROR_DEVICE_LOST };
+    let once = unsafe { (*info).flags }.contains(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+    let plain = once && !d.soon.load(Ordering::Acquire);
     // To begin is to reset.
-    with_objects(&d, |objects| objects.reset(buffer.as_raw()));
+    with_objects(&d, |objects| {
+        objects.reset(buffer.as_raw());
+        objects.recording(buffer).plain = plain;
+    });
     next!(d.table.begin, buffer, info)
 }
 
@@ -157,13 +165,21 @@ pub(crate) unsafe extern "system" fn bind_pipeline(
     pipeline: vk::Pipeline,
 ) {
     let Some(d) = (unsafe { device(buffer) }) else { return };
+    let mut ours = pipeline;
     if point == vk::PipelineBindPoint::GRAPHICS {
         with_objects(&d, |objects| {
             let bound = objects.pipelines.get(&pipeline.as_raw()).cloned();
-            objects.recording(buffer).pipeline = bound;
+            let commands = objects.recording(buffer);
+            if let Some(bound) = &bound
+                && !commands.plain
+                && !bound.ours.is_null()
+            {
+                ours = bound.ours;
+            }
+            commands.pipeline = bound;
         });
     }
-    next!(d.table.bind_pipeline, buffer, point, pipeline)
+    next!(d.table.bind_pipeline, buffer, point, ours)
 }
 
 pub(crate) unsafe extern "system" fn bind_sets(

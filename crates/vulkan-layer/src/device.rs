@@ -55,6 +55,8 @@ pub(crate) struct Device {
     pub recorder: Mutex<Recorder>,
     /// Whether there are submissions that have not been waited for.
     pub pending: AtomicBool,
+    /// Whether something is captured now or in the next frames.
+    pub soon: AtomicBool,
 }
 
 impl Device {
@@ -333,6 +335,7 @@ impl Device {
             Resources::none()
         });
         recorder.begin(resources.capacity());
+        let soon = recorder.soon();
         Self {
             handle,
             table,
@@ -348,6 +351,7 @@ impl Device {
             objects: Mutex::new(Objects::default()),
             recorder: Mutex::new(recorder),
             pending: AtomicBool::new(false),
+            soon: AtomicBool::new(soon),
         }
     }
 }

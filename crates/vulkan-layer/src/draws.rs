@@ -25,13 +25,15 @@ fn before(d: &Device, buffer: vk::CommandBuffer, command: Command) {
     with_objects(d, |objects| {
         let commands = objects.commands.entry(vk::Handle::as_raw(buffer)).or_default();
         let Some(pipeline) = commands.pipeline.clone() else { return };
-        let refused = match (&*pipeline.refused, command.refused) {
-            ("", why) => why,
-            (why, _) => why,
+        let recorded = pipeline.refused.is_empty() && !commands.plain;
+        let slot = if recorded { objects.slots.take() } else { None };
+        full = slot.is_none() && recorded;
+        let refused = match () {
+            () if !pipeline.refused.is_empty() => &*pipeline.refused,
+            () if commands.plain => PLAIN,
+            () if full => FULL,
+            () => command.refused,
         };
-        let slot = if pipeline.refused.is_empty() { objects.slots.take() } else { None };
-        full = slot.is_none() && pipeline.refused.is_empty();
-        let refused = if full { FULL } else { refused };
         commands.slots.extend(slot);
         let draw = log::Draw {
             slot: slot.unwrap_or(u32::MAX),
@@ -66,6 +68,7 @@ fn before(d: &Device, buffer: vk::CommandBuffer, command: Command) {
     }
 }
 
+const PLAIN: &str = "it was recorded before the capture was to begin";
 const FULL: &str = "more draws are recorded at a time than can be told apart";
 
 /// The pipeline that is bound.

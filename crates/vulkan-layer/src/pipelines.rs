@@ -10,6 +10,7 @@ use crate::device::{Device, SETTINGS, device};
 use crate::dynamic::Static;
 use crate::guard;
 use crate::log;
+use crate::memory::writable;
 use crate::objects::Objects;
 use crate::spirv::{self, Facts, Output};
 use crate::table::next;
@@ -17,6 +18,8 @@ use crate::table::next;
 /// A pipeline, or a part of one (`VK_KHR_pipeline_library`).
 pub(crate) struct Pipeline {
     pub number: u64,
+    /// What is bound in its place where draws are recorded; null where they are not.
+    pub ours: vk::Pipeline,
     pub layout: vk::PipelineLayout,
     name: Mutex<String>,
     /// Why its draws leave no records; empty where they do.
@@ -96,6 +99,9 @@ pub(crate) unsafe extern "system" fn destroy_pipeline(
     guard(|| {
         let mut objects = d.objects();
         let known = objects.pipelines.remove(&pipeline.as_raw());
+        if let Some(ours) = known.as_ref().map(|known| known.ours) {
+            let () = next!(d.table.destroy_pipeline, handle, ours, std::ptr::null());
+        }
         if let Some(layout) = known.map(|known| known.layout)
             && objects.layouts.release(layout)
         {
@@ -107,21 +113,17 @@ pub(crate) unsafe extern "system" fn destroy_pipeline(
 }
 
 /// A stage of a pipeline that is made.
-struct Stage<'a> {
+struct Stage {
     stage: vk::ShaderStageFlags,
     entry: String,
     code: Option<Arc<[u32]>>,
-    info: &'a vk::PipelineShaderStageCreateInfo<'a>,
 }
 
 /// The stages of a pipeline.
 ///
 /// # Safety
 /// As the program gave it.
-unsafe fn stages<'a>(
-    objects: &Objects,
-    info: &vk::GraphicsPipelineCreateInfo<'a>,
-) -> Vec<Stage<'a>> {
+unsafe fn stages(objects: &Objects, info: &vk::GraphicsPipelineCreateInfo<'_>) -> Vec<Stage> {
     let all = unsafe { slice(info.p_stages, info.stage_count) };
     let s_type = vk::StructureType::SHADER_MODULE_CREATE_INFO;
     all.iter()
@@ -132,7 +134,7 @@ unsafe fn stages<'a>(
                 (true, given) => given.map(|given| Arc::from(words(&*given))),
             };
             let entry = CStr::from_ptr(stage.p_name).to_string_lossy().into_owned();
-            Stage { stage: stage.stage, entry, code, info: stage }
+            Stage { stage: stage.stage, entry, code }
         })
         .collect()
 }
@@ -165,7 +167,7 @@ fn other_stage(stage: vk::ShaderStageFlags) -> Option<&'static str> {
 /// `BuiltIn DrawIndex` as SPIR-V decorates with it.
 const DRAW_INDEX: [u32; 2] = [11, 4426];
 
-fn rewrite(d: &Device, stages: &[Stage<'_>], library: bool, ours: bool) -> Rewritten {
+fn rewrite(d: &Device, stages: &[Stage], library: bool, ours: bool) -> Rewritten {
     let mut made = Rewritten::default();
     let place = |s: vk::ShaderStageFlags| stages.iter().position(|stage| stage.stage == s);
     let vertex = place(vk::ShaderStageFlags::VERTEX);
@@ -338,21 +340,11 @@ unsafe fn is_library(info: &vk::GraphicsPipelineCreateInfo<'_>) -> bool {
 /// Of a pipeline that draws depth alone, which is nothing to warn of.
 const DEPTH_ONLY: &str = "it has no fragment shader";
 
-/// One pipeline to be made.
-struct Plan {
-    stages: Vec<vk::PipelineShaderStageCreateInfo<'static>>,
-    pipeline: Pipeline,
-}
-
-/// What becomes of one create info.
+/// What a pipeline is that the program has made, with one of ours beside it.
 ///
 /// # Safety
-/// As the program gave it. The plan's stages live no longer than what `info` points at.
-unsafe fn plan(
-    d: &Device,
-    info: &vk::GraphicsPipelineCreateInfo<'_>,
-    modules: &mut Vec<vk::ShaderModule>,
-) -> Plan {
+/// As the program gave it.
+unsafe fn pipeline(d: &Device, info: &vk::GraphicsPipelineCreateInfo<'_>) -> Pipeline {
     let s_type = vk::StructureType::PIPELINE_LIBRARY_CREATE_INFO_KHR;
     let libraries = unsafe {
         find::<vk::PipelineLibraryCreateInfoKHR<'_>>(info.p_next, s_type)
@@ -380,27 +372,6 @@ unsafe fn plan(
     let has_fragment = stages.iter().any(|s| s.stage == vk::ShaderStageFlags::FRAGMENT);
     if parts.fragment && !has_fragment && !discards && made.refused.is_empty() {
         made.refused = DEPTH_ONLY.into();
-        made.shaders.clear();
-    }
-
-    let mut replaced: Vec<vk::PipelineShaderStageCreateInfo<'static>> = stages
-        .iter()
-        .map(|stage| unsafe {
-            // They outlive the call alone that they are made for.
-            std::mem::transmute_copy(stage.info)
-        })
-        .collect();
-    for (at, words) in std::mem::take(&mut made.shaders) {
-        match unsafe { replace(d, &mut replaced[at], &words) } {
-            Ok(module) => modules.push(module),
-            Err(why) => {
-                made.refused = why;
-                for (stage, original) in replaced.iter_mut().zip(&stages) {
-                    *stage = unsafe { std::mem::transmute_copy(original.info) };
-                }
-                break;
-            }
-        }
     }
 
     let (mut fixed, mut samples) = unsafe { fixed(info, parts) };
@@ -431,8 +402,17 @@ unsafe fn plan(
             made.refused.clone_from(&library.refused);
         }
     }
-    let pipeline = Pipeline {
+    let mut ours = vk::Pipeline::null();
+    let linked = libraries.iter().any(|library| !library.ours.is_null());
+    if made.refused.is_empty() && (linked || !made.shaders.is_empty()) {
+        match unsafe { create(d, info, &made.shaders, &libraries) } {
+            Ok(created) => ours = created,
+            Err(why) => made.refused = why,
+        }
+    }
+    Pipeline {
         number,
+        ours,
         layout: info.layout,
         name: Mutex::default(),
         refused: made.refused,
@@ -441,8 +421,84 @@ unsafe fn plan(
         facts,
         samples,
         parts: all,
+    }
+}
+
+/// A pipeline as the program's, of rewritten shaders and libraries.
+///
+/// # Safety
+/// As the program gave it.
+unsafe fn create(
+    d: &Device,
+    info: &vk::GraphicsPipelineCreateInfo<'_>,
+    shaders: &[(usize, Vec<u32>)],
+    libraries: &[Arc<Pipeline>],
+) -> Result<vk::Pipeline, String> {
+    let mut stages = unsafe { slice(info.p_stages, info.stage_count).to_vec() };
+    let mut modules = Vec::new();
+    let mut replaced = Ok(());
+    for (at, words) in shaders {
+        match unsafe { replace(d, &mut stages[*at], words) } {
+            Ok(module) => modules.push(module),
+            Err(why) => replaced = Err(why),
+        }
+    }
+    let mut ours = *info;
+    ours.p_stages = stages.as_ptr();
+    // What it is to be derived from, or not to be compiled for, is the program's affair.
+    ours.flags &= !(vk::PipelineCreateFlags::DERIVATIVE
+        | vk::PipelineCreateFlags::FAIL_ON_PIPELINE_COMPILE_REQUIRED
+        | vk::PipelineCreateFlags::EARLY_RETURN_ON_FAILURE);
+    let made = replaced.and_then(|()| {
+        let create = || {
+            let (none, null) = (vk::PipelineCache::null(), std::ptr::null());
+            let mut made = vk::Pipeline::null();
+            let result: vk::Result =
+                next!(d.table.create_pipelines, d.handle, none, 1, &ours, null, &mut made);
+            match result {
+                vk::Result::SUCCESS => Ok(made),
+                result => Err(format!("the driver does not make it, rewritten: {result}")),
+            }
+        };
+        unsafe { with_libraries(info.p_next, libraries, create) }
+    });
+    for module in modules {
+        let () = next!(d.table.destroy_shader_module, d.handle, module, std::ptr::null());
+    }
+    made
+}
+
+/// Does something while a chain names our libraries in place of the program's.
+///
+/// # Safety
+/// As [`find`].
+unsafe fn with_libraries<T>(
+    chain: *const c_void,
+    libraries: &[Arc<Pipeline>],
+    what: impl FnOnce() -> Result<T, String>,
+) -> Result<T, String> {
+    let s_type = vk::StructureType::PIPELINE_LIBRARY_CREATE_INFO_KHR;
+    let Some(named) = (unsafe { find::<vk::PipelineLibraryCreateInfoKHR<'_>>(chain, s_type) })
+    else {
+        return what();
     };
-    Plan { stages: replaced, pipeline }
+    if !writable(named.cast(), size_of::<vk::PipelineLibraryCreateInfoKHR<'_>>()) {
+        return Err("its libraries are named where nothing can be written".into());
+    }
+    unsafe {
+        let theirs = slice((*named).p_libraries, (*named).library_count);
+        if theirs.len() != libraries.len() {
+            return Err("one of its libraries is not known".into());
+        }
+        let pairs = theirs.iter().zip(libraries);
+        let ours: Vec<vk::Pipeline> = pairs
+            .map(|(theirs, library)| if library.ours.is_null() { *theirs } else { library.ours })
+            .collect();
+        (*named).p_libraries = ours.as_ptr();
+        let result = what();
+        (*named).p_libraries = theirs.as_ptr();
+        result
+    }
 }
 
 /// Has a stage run other words.
@@ -451,7 +507,7 @@ unsafe fn plan(
 /// As the program gave it.
 unsafe fn replace(
     d: &Device,
-    stage: &mut vk::PipelineShaderStageCreateInfo<'static>,
+    stage: &mut vk::PipelineShaderStageCreateInfo<'_>,
     words: &[u32],
 ) -> Result<vk::ShaderModule, String> {
     let given = vk::StructureType::SHADER_MODULE_CREATE_INFO;
@@ -482,54 +538,24 @@ pub(crate) unsafe extern "system" fn create_pipelines(
     out: *mut vk::Pipeline,
 ) -> vk::Result {
     let Some(d) = (unsafe { device(handle) }) else { return vk::Result::ERROR_DEVICE_LOST };
-    let theirs = unsafe { slice(infos, n) };
-    let mut modules = Vec::new();
-    let plans = guard(|| {
-        if !d.resources.usable() {
-            return None;
-        }
-        Some(theirs.iter().map(|info| unsafe { plan(&d, info, &mut modules) }).collect::<Vec<_>>())
-    });
-    let Some(mut plans) = plans.flatten() else {
-        return next!(d.table.create_pipelines, handle, cache, n, infos, allocator, out);
-    };
-    let mut ours = theirs.to_vec();
-    for (info, plan) in ours.iter_mut().zip(&plans) {
-        info.p_stages = plan.stages.as_ptr().cast();
-    }
-    let create = |infos: *const vk::GraphicsPipelineCreateInfo<'_>| -> vk::Result {
-        next!(d.table.create_pipelines, handle, cache, n, infos, allocator, out)
-    };
-    let mut result = create(ours.as_ptr());
-    if result.as_raw() < 0 {
-        // With the program's own shaders, as if we were not there. What of it was made goes first.
-        for at in 0..n as usize {
-            let made = unsafe { *out.add(at) };
-            let () = next!(d.table.destroy_pipeline, handle, made, allocator);
-        }
-        let why = format!("the driver refuses it, rewritten: {result}");
-        plans.iter_mut().for_each(|plan| plan.pipeline.refused.clone_from(&why));
-        result = create(infos);
-    }
-    for module in modules {
-        let () = next!(d.table.destroy_shader_module, handle, module, std::ptr::null());
+    // The program's own are made as it wants them; ours stand beside.
+    let result = next!(d.table.create_pipelines, handle, cache, n, infos, allocator, out);
+    if !d.resources.usable() {
+        return result;
     }
     guard(|| {
-        let made = unsafe { slice(out, n) };
-        let mut notes = Vec::new();
-        let mut objects = d.objects();
-        for (handle, plan) in made.iter().zip(plans).filter(|(handle, _)| !handle.is_null()) {
-            let pipeline = plan.pipeline;
+        let (infos, made) = unsafe { (slice(infos, n), slice(out, n)) };
+        for (info, handle) in infos.iter().zip(made).filter(|(_, handle)| !handle.is_null()) {
+            let pipeline = unsafe { pipeline(&d, info) };
             let why = &pipeline.refused;
             if !why.is_empty() && why != DEPTH_ONLY && pipeline.parts.output {
-                notes.push(format!("some draws are not captured: of their pipeline, {why}"));
+                let note = format!("some draws are not captured: of their pipeline, {why}");
+                d.recorder().note(&note);
             }
+            let mut objects = d.objects();
             objects.layouts.retain(pipeline.layout);
             objects.pipelines.insert(handle.as_raw(), Arc::new(pipeline));
         }
-        drop(objects);
-        let mut recorder = d.recorder();
-        notes.iter().for_each(|note| recorder.note(note));
     });
     result
 }

@@ -248,6 +248,9 @@ impl Made {
     }
 }
 
+/// Frames that programs record ahead, at most.
+const AHEAD: u64 = 4;
+
 /// A submission that has not been waited for.
 pub(crate) struct Pending {
     pub number: u64,
@@ -359,6 +362,16 @@ impl Recorder {
             Span::Submissions(first, last) => (first..=last).contains(&number),
         };
         inside && !self.done && self.open.is_some() && self.at_home()
+    }
+
+    /// Whether something is asked for now or in the next frames, of which programs record some
+    /// before the last is presented.
+    pub(crate) fn soon(&self) -> bool {
+        let near = match self.span {
+            Span::Frames(first, last) => self.frame + AHEAD >= first && self.frame <= last,
+            Span::First | Span::Submissions(..) => true,
+        };
+        near && !self.done && self.open.is_some()
     }
 
     /// Does something with the files. Where it fails, they go: half a log would look like one.

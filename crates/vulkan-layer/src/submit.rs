@@ -427,6 +427,7 @@ pub(crate) unsafe extern "system" fn present(
         let images = swapchains.iter().zip(indices).filter_map(image).collect();
         drop(objects);
         recorder.present(images);
+        d.soon.store(recorder.soon(), Ordering::Release);
     });
     next!(d.table.present, queue, info)
 }
