@@ -7,6 +7,7 @@ use crate::gpu::Gpu;
 
 pub(crate) struct Image {
     pub(crate) handle: vk::Image,
+    /// None where it is only copied.
     pub(crate) view: vk::ImageView,
     pub(crate) format: vk::Format,
     pub(crate) extent: vk::Extent2D,
@@ -52,6 +53,11 @@ impl Image {
             let requirements = gpu.device.get_image_memory_requirements(handle);
             let memory = gpu.memory(requirements, vk::MemoryPropertyFlags::empty())?;
             gpu.device.bind_image_memory(handle, memory, 0)?;
+            let copied = vk::ImageUsageFlags::TRANSFER_SRC | vk::ImageUsageFlags::TRANSFER_DST;
+            if copied.contains(plan.usage) {
+                let ImagePlan { format, extent, layers, .. } = plan;
+                return Ok(Self { handle, view: vk::ImageView::null(), format, extent, layers });
+            }
             Self::seen(gpu, handle, plan)
         }
     }

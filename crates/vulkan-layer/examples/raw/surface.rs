@@ -13,7 +13,7 @@ pub(crate) struct Surface {
     pub(crate) calls: ash::khr::surface::Instance,
     window: Option<Window>,
     /// The surface goes before its instance.
-    _host: Rc<Host>,
+    host: Rc<Host>,
 }
 
 impl Surface {
@@ -21,7 +21,7 @@ impl Surface {
     pub(crate) fn open(extent: vk::Extent2D) -> Result<(Rc<Host>, Option<Self>)> {
         for make in [Self::headless, Self::window] {
             match make(extent) {
-                Ok(surface) => return Ok((surface._host.clone(), Some(surface))),
+                Ok(surface) => return Ok((surface.host.clone(), Some(surface))),
                 Err(Failure::Unsupported(_)) => {}
                 Err(failure) => return Err(failure),
             }
@@ -41,7 +41,7 @@ impl Surface {
         let info = vk::HeadlessSurfaceCreateInfoEXT::default();
         // SAFETY: the instance was made with the extension.
         let handle = unsafe { make.create_headless_surface(&info, None) }?;
-        Self { handle, calls, window: None, _host: host }.usable()
+        Self { handle, calls, window: None, host }.usable()
     }
 
     fn window(extent: vk::Extent2D) -> Result<Self> {
@@ -52,12 +52,12 @@ impl Surface {
             vk::XlibSurfaceCreateInfoKHR::default().dpy(window.display).window(window.window);
         // SAFETY: the window lives as long as the surface.
         let handle = unsafe { make.create_xlib_surface(&info, None) }?;
-        Self { handle, calls, window: Some(window), _host: host }.usable()
+        Self { handle, calls, window: Some(window), host }.usable()
     }
 
     /// If the first queue family can present.
     fn usable(self) -> Result<Self> {
-        let physical = self._host.physical;
+        let physical = self.host.physical;
         // SAFETY: the surface is the instance's.
         let there =
             unsafe { self.calls.get_physical_device_surface_support(physical, 0, self.handle) }?;

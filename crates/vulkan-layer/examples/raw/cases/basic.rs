@@ -59,6 +59,8 @@ fn depth_test(target: TargetPlan, compare: vk::CompareOp, shader: Shader) -> Res
 pub(super) fn no_fragment_output() -> Result<Vec<u8>> {
     prepass(|mut plan| {
         plan.stages.truncate(1);
+        // Without a shader colours are not defined.
+        plan.blends[0].color_write_mask = vk::ColorComponentFlags::empty();
         plan
     })
 }
