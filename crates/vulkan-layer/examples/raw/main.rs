@@ -6,14 +6,17 @@
 //! with status 3.
 
 mod cases;
+mod chain;
 mod failure;
 mod gpu;
 mod host;
 mod memory;
+mod pass;
 mod pipeline;
 mod record;
 mod scene;
 mod shader;
+mod surface;
 mod target;
 
 use std::path::PathBuf;
@@ -33,7 +36,7 @@ fn main() -> ExitCode {
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     let (case, out, number) = match words[..] {
         ["--list"] => {
-            CASES.iter().for_each(|case| println!("{:22} {}", case.name, case.says));
+            CASES.iter().for_each(|case| println!("{:28} {}", case.name, case.says));
             return ExitCode::SUCCESS;
         }
         [case, out] => (case, out, None),

@@ -7,6 +7,7 @@ use crate::gpu::Gpu;
 
 pub(crate) struct Image {
     pub(crate) handle: vk::Image,
+    /// None where it is only copied.
     pub(crate) view: vk::ImageView,
     pub(crate) format: vk::Format,
     pub(crate) extent: vk::Extent2D,
@@ -52,19 +53,29 @@ impl Image {
             let requirements = gpu.device.get_image_memory_requirements(handle);
             let memory = gpu.memory(requirements, vk::MemoryPropertyFlags::empty())?;
             gpu.device.bind_image_memory(handle, memory, 0)?;
-            let kind = if plan.layers == 1 {
-                vk::ImageViewType::TYPE_2D
-            } else {
-                vk::ImageViewType::TYPE_2D_ARRAY
-            };
-            let view = vk::ImageViewCreateInfo::default()
-                .image(handle)
-                .view_type(kind)
-                .format(plan.format)
-                .subresource_range(range(plan.format, plan.layers));
-            let view = gpu.device.create_image_view(&view, None)?;
+            let copied = vk::ImageUsageFlags::TRANSFER_SRC | vk::ImageUsageFlags::TRANSFER_DST;
+            if copied.contains(plan.usage) {
+                let ImagePlan { format, extent, layers, .. } = plan;
+                return Ok(Self { handle, view: vk::ImageView::null(), format, extent, layers });
+            }
+            Self::seen(gpu, handle, plan)
+        }
+    }
+
+    /// An image that is there, with a view of its own.
+    pub(crate) fn seen(gpu: &Gpu, handle: vk::Image, plan: ImagePlan) -> Result<Self> {
+        let ImagePlan { format, extent, layers, .. } = plan;
+        let kind =
+            if layers == 1 { vk::ImageViewType::TYPE_2D } else { vk::ImageViewType::TYPE_2D_ARRAY };
+        let info = vk::ImageViewCreateInfo::default()
+            .image(handle)
+            .view_type(kind)
+            .format(format)
+            .subresource_range(range(format, layers));
+        // SAFETY: the image is the device's.
+        unsafe {
+            let view = gpu.device.create_image_view(&info, None)?;
             gpu.at_end(move |d| d.destroy_image_view(view, None));
-            let ImagePlan { format, extent, layers, .. } = plan;
             Ok(Self { handle, view, format, extent, layers })
         }
     }
@@ -84,7 +95,9 @@ fn range(format: vk::Format, layers: u32) -> vk::ImageSubresourceRange {
 pub(crate) fn aspects(format: vk::Format) -> vk::ImageAspectFlags {
     match format {
         vk::Format::D32_SFLOAT => vk::ImageAspectFlags::DEPTH,
-        vk::Format::S8_UINT => vk::ImageAspectFlags::STENCIL,
+        vk::Format::D32_SFLOAT_S8_UINT => {
+            vk::ImageAspectFlags::DEPTH | vk::ImageAspectFlags::STENCIL
+        }
         _ => vk::ImageAspectFlags::COLOR,
     }
 }

@@ -97,7 +97,7 @@ impl Plan {
             sample_shading: false,
             alpha_to_coverage: false,
             depth_stencil: vk::PipelineDepthStencilStateCreateInfo::default(),
-            blends: vec![OVER; plan.subpasses[0].len()],
+            blends: vec![OVER; plan.subpasses[0].colours.len()],
             logic: None,
             constants: [0.0; 4],
             dynamic: Vec::new(),
@@ -128,6 +128,12 @@ impl Plan {
             .depth_test_enable(true)
             .depth_compare_op(compare)
             .depth_write_enable(write);
+        self
+    }
+
+    /// With a stencil test of both faces.
+    pub(crate) fn stencil(mut self, state: vk::StencilOpState) -> Self {
+        self.depth_stencil = self.depth_stencil.stencil_test_enable(true).front(state).back(state);
         self
     }
 

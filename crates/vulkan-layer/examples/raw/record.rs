@@ -84,6 +84,12 @@ impl<'a> Recorder<'a> {
         unsafe { self.gpu.device.cmd_begin_render_pass(self.buffer, &info, contents) }
     }
 
+    pub(crate) fn next_subpass(&self) {
+        let contents = vk::SubpassContents::INLINE;
+        // SAFETY: a pass with another subpass was begun.
+        unsafe { self.gpu.device.cmd_next_subpass(self.buffer, contents) }
+    }
+
     pub(crate) fn end_pass(&self) {
         // SAFETY: a pass was begun.
         unsafe { self.gpu.device.cmd_end_render_pass(self.buffer) }

@@ -5,6 +5,7 @@ use ash::vk;
 use crate::failure::Result;
 use crate::gpu::Gpu;
 use crate::memory::{Image, ImagePlan, aspects};
+use crate::pass::Subpass;
 
 pub(crate) const EXTENT: vk::Extent2D = vk::Extent2D { width: 200, height: 150 };
 
@@ -24,8 +25,9 @@ pub(crate) struct TargetPlan {
     pub(crate) multiview: bool,
     /// Make the framebuffer without its images.
     pub(crate) imageless: bool,
-    /// Which colours each subpass draws to.
-    pub(crate) subpasses: Vec<Vec<u32>>,
+    pub(crate) subpasses: Vec<Subpass>,
+    /// Several samples are left for a command to resolve.
+    pub(crate) unresolved: bool,
 }
 
 impl Default for TargetPlan {
@@ -39,7 +41,8 @@ impl Default for TargetPlan {
             layers: 1,
             multiview: false,
             imageless: false,
-            subpasses: vec![vec![0]],
+            subpasses: vec![Subpass::to(&[0])],
+            unresolved: false,
         }
     }
 }
@@ -57,8 +60,18 @@ impl TargetPlan {
         Self { colours: vec![format], ..Self::default() }
     }
 
-    fn resolves(&self) -> bool {
-        self.samples != vk::SampleCountFlags::TYPE_1
+    /// Two colours, both drawn to by each draw.
+    pub(crate) fn two() -> Self {
+        Self {
+            colours: vec![vk::Format::R8G8B8A8_UNORM; 2],
+            subpasses: vec![Subpass::to(&[0, 1])],
+            ..Self::default()
+        }
+    }
+
+    /// Whether the pass resolves several samples.
+    pub(crate) fn resolves(&self) -> bool {
+        self.samples != vk::SampleCountFlags::TYPE_1 && !self.unresolved
     }
 
     /// In the order of the attachments: colours, what they are resolved to, depth.
@@ -76,119 +89,6 @@ impl TargetPlan {
         clears.extend(self.depth.map(|_| vk::ClearValue { depth_stencil }));
         clears
     }
-
-    /// All render passes that are made of a plan suit its framebuffer.
-    pub(crate) fn pass(&self, gpu: &Gpu, load: bool) -> Result<vk::RenderPass> {
-        let attachments = self.attachments(load);
-        let count = self.colours.len();
-        let depth = vk::AttachmentReference {
-            attachment: attachments.len() as u32 - 1,
-            layout: vk::ImageLayout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL,
-        };
-        let reference = |attachment| vk::AttachmentReference {
-            attachment,
-            layout: vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
-        };
-        let colours: Vec<Vec<_>> =
-            self.subpasses.iter().map(|s| s.iter().map(|&c| reference(c)).collect()).collect();
-        let resolves: Vec<Vec<_>> = self
-            .subpasses
-            .iter()
-            .map(|s| s.iter().map(|&c| reference(c + count as u32)).collect())
-            .collect();
-        let subpasses: Vec<_> = colours
-            .iter()
-            .zip(&resolves)
-            .map(|(colours, resolves)| {
-                let mut subpass = vk::SubpassDescription::default().color_attachments(colours);
-                if self.resolves() {
-                    subpass = subpass.resolve_attachments(resolves);
-                }
-                if self.depth.is_some() {
-                    subpass = subpass.depth_stencil_attachment(&depth);
-                }
-                subpass
-            })
-            .collect();
-        let dependencies = dependencies(subpasses.len() as u32);
-        let masks = vec![(1 << self.layers) - 1; subpasses.len()];
-        let mut views = vk::RenderPassMultiviewCreateInfo::default().view_masks(&masks);
-        let mut info = vk::RenderPassCreateInfo::default()
-            .attachments(&attachments)
-            .subpasses(&subpasses)
-            .dependencies(&dependencies);
-        if self.multiview {
-            info = info.push_next(&mut views);
-        }
-        // SAFETY: what the structures point at lives until the end of the block.
-        unsafe {
-            let pass = gpu.device.create_render_pass(&info, None)?;
-            gpu.at_end(move |d| d.destroy_render_pass(pass, None));
-            Ok(pass)
-        }
-    }
-
-    fn attachments(&self, load: bool) -> Vec<vk::AttachmentDescription> {
-        let attachment = |format, samples, fin| {
-            let (load, before) = if load {
-                (vk::AttachmentLoadOp::LOAD, fin)
-            } else {
-                (vk::AttachmentLoadOp::CLEAR, vk::ImageLayout::UNDEFINED)
-            };
-            vk::AttachmentDescription::default()
-                .format(format)
-                .samples(samples)
-                .load_op(load)
-                .store_op(vk::AttachmentStoreOp::STORE)
-                .stencil_load_op(load)
-                .stencil_store_op(vk::AttachmentStoreOp::STORE)
-                .initial_layout(before)
-                .final_layout(fin)
-        };
-        let read = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
-        let mut all: Vec<_> =
-            self.colours.iter().map(|&format| attachment(format, self.samples, read)).collect();
-        if self.resolves() {
-            let one = vk::SampleCountFlags::TYPE_1;
-            all.extend(self.colours.iter().map(|&format| attachment(format, one, read)));
-        }
-        let depth = vk::ImageLayout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL;
-        all.extend(self.depth.map(|format| attachment(format, self.samples, depth)));
-        all
-    }
-}
-
-/// Each subpass waits for what was drawn before it, and what comes after for the last.
-fn dependencies(subpasses: u32) -> Vec<vk::SubpassDependency> {
-    let draws = vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT
-        | vk::PipelineStageFlags::EARLY_FRAGMENT_TESTS
-        | vk::PipelineStageFlags::LATE_FRAGMENT_TESTS;
-    let writes =
-        vk::AccessFlags::COLOR_ATTACHMENT_WRITE | vk::AccessFlags::DEPTH_STENCIL_ATTACHMENT_WRITE;
-    let reads =
-        vk::AccessFlags::COLOR_ATTACHMENT_READ | vk::AccessFlags::DEPTH_STENCIL_ATTACHMENT_READ;
-    let before = |i: u32| if i == 0 { vk::SUBPASS_EXTERNAL } else { i - 1 };
-    let mut all: Vec<_> = (0..subpasses)
-        .map(|i| {
-            vk::SubpassDependency::default()
-                .src_subpass(before(i))
-                .dst_subpass(i)
-                .src_stage_mask(draws | vk::PipelineStageFlags::TRANSFER)
-                .src_access_mask(writes)
-                .dst_stage_mask(draws)
-                .dst_access_mask(writes | reads)
-        })
-        .collect();
-    all.push(
-        vk::SubpassDependency::default()
-            .src_subpass(subpasses - 1)
-            .dst_subpass(vk::SUBPASS_EXTERNAL)
-            .src_stage_mask(draws)
-            .src_access_mask(writes)
-            .dst_stage_mask(draws | vk::PipelineStageFlags::TRANSFER)
-            .dst_access_mask(writes | reads | vk::AccessFlags::TRANSFER_READ),
-    );
-    all
 }
 
 /// The images of a plan.
@@ -202,13 +102,16 @@ pub(crate) struct Images {
 impl Images {
     pub(crate) fn new(gpu: &Gpu, plan: &TargetPlan) -> Result<Self> {
         let image = |format, samples| {
-            let drawn = if aspects(format) == vk::ImageAspectFlags::COLOR {
+            let mut usage = if aspects(format) == vk::ImageAspectFlags::COLOR {
                 vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC
             } else {
                 vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT
             };
+            if plan.subpasses.iter().any(|s| !s.inputs.is_empty()) {
+                usage |= vk::ImageUsageFlags::INPUT_ATTACHMENT;
+            }
             let (extent, layers) = (plan.extent, plan.layers);
-            Image::new(gpu, ImagePlan { format, extent, layers, samples, usage: drawn })
+            Image::new(gpu, ImagePlan { format, extent, layers, samples, usage })
         };
         let of = |samples| plan.colours.iter().map(|&f| image(f, samples)).collect::<Result<_>>();
         Ok(Self {
@@ -238,6 +141,10 @@ pub(crate) struct Target {
 impl Target {
     pub(crate) fn new(gpu: &Gpu, plan: TargetPlan) -> Result<Self> {
         let images = Images::new(gpu, &plan)?;
+        Self::of(gpu, plan, images)
+    }
+
+    pub(crate) fn of(gpu: &Gpu, plan: TargetPlan, images: Images) -> Result<Self> {
         let pass = plan.pass(gpu, false)?;
         let framebuffer = framebuffer(gpu, &plan, pass, &images.views())?;
         Ok(Self { plan, images, pass, framebuffer })

@@ -1,23 +1,26 @@
 //! Command buffers: secondaries, and the same one submitted again.
 
 use ash::vk;
+use vk::CommandBufferUsageFlags as Usage;
 
 use crate::failure::Result;
 use crate::gpu::Gpu;
 use crate::pipeline::Plan;
 use crate::record::{Recorder, read};
-use crate::scene::shapes;
+use crate::scene::{Shape, shapes};
 use crate::target::{Target, TargetPlan};
 
-const SIMULTANEOUS: vk::CommandBufferUsageFlags = vk::CommandBufferUsageFlags::SIMULTANEOUS_USE;
-
 pub(super) fn secondaries() -> Result<Vec<u8>> {
-    executed(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT, |first, second| vec![second, first])
+    executed(Usage::ONE_TIME_SUBMIT, |first, second| vec![second, first])
+}
+
+pub(super) fn secondary_twice() -> Result<Vec<u8>> {
+    executed(Usage::SIMULTANEOUS_USE, |first, second| vec![first, second, first])
 }
 
 /// Records two secondaries and executes them as `order` says.
 fn executed(
-    flags: vk::CommandBufferUsageFlags,
+    flags: Usage,
     order: impl FnOnce(vk::CommandBuffer, vk::CommandBuffer) -> Vec<vk::CommandBuffer>,
 ) -> Result<Vec<u8>> {
     let gpu = Gpu::plain()?;
@@ -44,6 +47,13 @@ pub(super) fn twice() -> Result<Vec<u8>> {
     repeated(|gpu, primary| gpu.run(&[primary, primary]))
 }
 
+pub(super) fn again() -> Result<Vec<u8>> {
+    repeated(|gpu, primary| {
+        gpu.submit(&[primary])?;
+        gpu.run(&[primary])
+    })
+}
+
 /// Records a primary that draws onto what is there, and submits it as `submit` says.
 fn repeated(submit: impl FnOnce(&Gpu, vk::CommandBuffer) -> Result<()>) -> Result<Vec<u8>> {
     let gpu = Gpu::plain()?;
@@ -57,11 +67,38 @@ fn repeated(submit: impl FnOnce(&Gpu, vk::CommandBuffer) -> Result<()>) -> Resul
     cleared.end_pass();
     cleared.run()?;
 
-    let recorder = Recorder::new(&gpu, SIMULTANEOUS)?;
+    let recorder = Recorder::new(&gpu, Usage::SIMULTANEOUS_USE)?;
     recorder.pass_of(&target, loading, vk::SubpassContents::INLINE);
     recorder.bind(pipeline);
     recorder.shapes(plan.layout, &shapes());
     recorder.end_pass();
     submit(&gpu, recorder.end()?)?;
+    read(&gpu, target.images.finished())
+}
+
+/// Recorded, thrown away with its pool's memory, recorded again, submitted.
+pub(super) fn recorded_again() -> Result<Vec<u8>> {
+    let gpu = Gpu::plain()?;
+    let target = Target::new(&gpu, TargetPlan::default())?;
+    let plan = Plan::new(&gpu, &target)?;
+    let pipeline = plan.create(&gpu)?;
+    let recorder = Recorder::once(&gpu)?;
+    let draw = |recorder: &Recorder<'_>, shapes: &[Shape]| {
+        recorder.pass(&target);
+        recorder.bind(pipeline);
+        recorder.shapes(plan.layout, shapes);
+        recorder.end_pass();
+    };
+    draw(&recorder, &shapes()[..2]);
+    let buffer = recorder.end()?;
+    // SAFETY: no buffer of the pool was submitted.
+    unsafe {
+        gpu.device.reset_command_pool(gpu.pool, vk::CommandPoolResetFlags::RELEASE_RESOURCES)?;
+        let info = vk::CommandBufferBeginInfo::default().flags(Usage::ONE_TIME_SUBMIT);
+        gpu.device.begin_command_buffer(buffer, &info)?;
+    }
+    let recorder = Recorder { gpu: &gpu, buffer };
+    draw(&recorder, &shapes()[2..]);
+    recorder.run()?;
     read(&gpu, target.images.finished())
 }

@@ -81,3 +81,28 @@ fn linked(gpu: &Gpu, plan: &Plan) -> Result<vk::Pipeline> {
     let info = vk::GraphicsPipelineCreateInfo::default().layout(plan.layout).push_next(&mut linked);
     pipeline(gpu, &info)
 }
+
+/// Shaders in the stages' own structures, with no modules.
+pub(super) fn module_in_pnext() -> Result<Vec<u8>> {
+    let gpu = Gpu::with(ask)?;
+    let target = Target::new(&gpu, TargetPlan::default())?;
+    let plan = Plan::new(&gpu, &target)?;
+    let words: Vec<_> = plan.stages.iter().map(|shader| shader.words()).collect();
+    let mut codes: Vec<_> =
+        words.iter().map(|words| vk::ShaderModuleCreateInfo::default().code(words)).collect();
+    let stages: Vec<_> = codes
+        .iter_mut()
+        .zip(&plan.stages)
+        .map(|(code, shader)| {
+            vk::PipelineShaderStageCreateInfo::default()
+                .stage(shader.kind)
+                .name(c"main")
+                .push_next(code)
+        })
+        .collect();
+    let pipeline = plan.describe_with(&stages, |info| pipeline(&gpu, info))?;
+    one_pass(&gpu, &target, |recorder| {
+        recorder.bind(pipeline);
+        recorder.shapes(plan.layout, &shapes());
+    })
+}

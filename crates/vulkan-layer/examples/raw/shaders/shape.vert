@@ -1,5 +1,6 @@
 #version 450
-// A triangle (3 vertices) or a square (6), with each instance a little further along.
+// A triangle (3 vertices) or a square (6), with each instance a little further along, and a little
+// lower what begins at a later vertex.
 layout(push_constant) uniform Shape {
     vec4 place; // x, y, size, depth
     vec4 colour;
@@ -14,6 +15,7 @@ void main() {
     vec2 corner = CORNERS[gl_VertexIndex % 6];
     float k = float(gl_InstanceIndex);
     vec2 at = shape.place.xy + shape.place.z * corner + k * vec2(0.17, 0.11);
+    at.y += 0.2 * float(gl_VertexIndex / 6);
     // Depth leans, so that it has slopes.
     float depth = shape.place.w + 0.03 * corner.x - 0.02 * corner.y + 0.04 * k;
     gl_Position = vec4(at, depth, 1);
