@@ -28,7 +28,7 @@ pub(crate) fn shapes() -> Vec<Shape> {
             let k = f32::from(i);
             let [r, g, b] = colours[usize::from(i) % 4];
             Shape {
-                vertices: if i % 2 == 0 { 6 } else { 3 },
+                vertices: if i.is_multiple_of(2) { 6 } else { 3 },
                 instances: 1 + u32::from(i) % 3,
                 place: [
                     k * 0.19 - 0.95,

@@ -167,7 +167,7 @@ pub(super) fn push() -> Result<Vec<u8>> {
 pub(super) fn many_draws() -> Result<Vec<u8>> {
     let spread = |i: u16, by: u16| f32::from(i.wrapping_mul(by) % 1000) / 500.0 - 1.0;
     let small = (0..5000_u16).map(|i| Shape {
-        vertices: if i % 2 == 0 { 6 } else { 3 },
+        vertices: if i.is_multiple_of(2) { 6 } else { 3 },
         instances: 1,
         place: [spread(i, 397), spread(i, 211), 0.05, f32::from(i) / 5000.0],
         colour: [spread(i, 89).abs(), spread(i, 53).abs(), spread(i, 17).abs(), 0.5],

@@ -17,6 +17,21 @@ use crate::target::{Target, TargetPlan};
 /// Bytes between two tints; every device can have an offset of this.
 const STRIDE: u32 = 256;
 
+/// Parts of a tint that differ.
+const PARTS: [[f32; 4]; 4] =
+    [[0.7, 0.2, 0.5, 0.5], [0.2, 0.7, 0.4, 0.5], [0.1, 0.5, 0.9, 0.4], [0.9, 0.1, 0.2, 0.6]];
+
+/// Parts for `count` sets. The first `read` make the same tint together, however many they are, so
+/// that a layer that takes a set away does not change the picture. Sums of such numbers are exact.
+fn parts(read: u32, count: u32) -> Vec<[f32; 4]> {
+    let part = |k: u32| [1.0, -2.0, 3.0, 1.0].map(|way| way * k as f32 / 128.0);
+    let mut all: Vec<_> = (0..count).map(part).collect();
+    let sum = |i: usize| all[1..read as usize].iter().map(|part| part[i]).sum::<f32>();
+    let first = [0.75, 0.875, 1.0, 1.0];
+    all[0] = std::array::from_fn(|i| first[i] - sum(i));
+    all
+}
+
 /// A descriptor set for each of some tints.
 struct Tints {
     layouts: Vec<vk::DescriptorSetLayout>,
@@ -30,16 +45,16 @@ fn tint(buffer: &Buffer, k: u32) -> vk::DescriptorBufferInfo {
     vk::DescriptorBufferInfo { buffer, offset, range: 16 }
 }
 
-fn tints(gpu: &Gpu, count: u32, kind: Kind) -> Result<Tints> {
-    let values = (0..=count).map(|k| k as f32 / count as f32).flat_map(|t| {
+fn tints(gpu: &Gpu, tints: &[[f32; 4]], kind: Kind) -> Result<Tints> {
+    let values = tints.iter().flat_map(|tint| {
         let mut words = [0; STRIDE as usize / 4];
-        words[..4].copy_from_slice(&[1.0 - 0.6 * t, 0.4 + 0.6 * t, 1.0, 1.0].map(f32::to_bits));
+        words[..4].copy_from_slice(&tint.map(f32::to_bits));
         words
     });
     let values: Vec<u32> = values.collect();
     let buffer = Buffer::of(gpu, &values, vk::BufferUsageFlags::UNIFORM_BUFFER)?;
     let set_layout = set_layout(gpu, kind, vk::DescriptorSetLayoutCreateFlags::empty())?;
-    let layouts = vec![set_layout; count as usize];
+    let layouts = vec![set_layout; tints.len()];
     let sets = allocate(gpu, kind, &layouts)?;
     for (&set, k) in sets.iter().zip(0..) {
         // A dynamic offset says where instead.
@@ -108,9 +123,9 @@ pub(super) fn sets() -> Result<Vec<u8>> {
     let gpu = Gpu::plain()?;
     match gpu.host.limits.max_bound_descriptor_sets {
         0..4 => Err(Failure::unsupported("fewer than four sets")),
-        4..7 => with_sets(&gpu, 4, shader::FOUR_SETS),
-        7 => with_sets(&gpu, 7, shader::SEVEN_SETS),
-        8.. => with_sets(&gpu, 8, shader::EIGHT_SETS),
+        4..7 => with_sets(&gpu, &parts(4, 4), shader::FOUR_SETS),
+        7 => with_sets(&gpu, &parts(7, 7), shader::SEVEN_SETS),
+        8.. => with_sets(&gpu, &parts(8, 8), shader::EIGHT_SETS),
     }
 }
 
@@ -119,17 +134,18 @@ pub(super) fn all_sets() -> Result<Vec<u8>> {
     let gpu = Gpu::plain()?;
     let limits = &gpu.host.limits;
     let most = limits.max_per_stage_descriptor_uniform_buffers;
-    with_sets(&gpu, limits.max_bound_descriptor_sets.min(most), shader::TWO_SETS)
+    let count = limits.max_bound_descriptor_sets.min(most);
+    with_sets(&gpu, &parts(2, count), shader::TWO_SETS)
 }
 
 /// As a program does that was never told otherwise.
 pub(super) fn sets_unasked() -> Result<Vec<u8>> {
-    with_sets(&Gpu::plain()?, 8, shader::EIGHT_SETS)
+    with_sets(&Gpu::plain()?, &parts(8, 8), shader::EIGHT_SETS)
 }
 
-fn with_sets(gpu: &Gpu, count: u32, shader: Shader) -> Result<Vec<u8>> {
+fn with_sets(gpu: &Gpu, parts: &[[f32; 4]], shader: Shader) -> Result<Vec<u8>> {
     let target = Target::new(gpu, TargetPlan::default())?;
-    let tints = tints(gpu, count, Kind::UNIFORM_BUFFER)?;
+    let tints = tints(gpu, parts, Kind::UNIFORM_BUFFER)?;
     let layout = layout(gpu, &tints.layouts, SHAPE)?;
     let plan = Plan { layout, ..Plan::new(gpu, &target)? }.fragment(shader);
     let pipeline = plan.create(gpu)?;
@@ -158,7 +174,7 @@ pub(super) fn set_below() -> Result<Vec<u8>> {
 fn kept(kind: Kind, below: bool) -> Result<Vec<u8>> {
     let gpu = Gpu::plain()?;
     let target = Target::new(&gpu, TargetPlan::default())?;
-    let tints = tints(&gpu, 3, kind)?;
+    let tints = tints(&gpu, &PARTS, kind)?;
     let both = layout(&gpu, &tints.layouts[..2], SHAPE)?;
     let one = layout(&gpu, &tints.layouts[..1], SHAPE)?;
     let plan = Plan::new(&gpu, &target)?;
@@ -173,7 +189,7 @@ fn kept(kind: Kind, below: bool) -> Result<Vec<u8>> {
         recorder.shapes(both, &all[..2]);
         recorder.bind(other);
         if below {
-            bind(recorder, one, 0, &tints.sets[2..], &[]);
+            bind(recorder, one, 0, &tints.sets[2..3], &[]);
         }
         recorder.shapes(one, &all[2..4]);
         recorder.bind(first);
@@ -186,7 +202,7 @@ pub(super) fn push_descriptors() -> Result<Vec<u8>> {
     let gpu = Gpu::with(|opening| opening.extension(ash::khr::push_descriptor::NAME))?;
     let calls = ash::khr::push_descriptor::Device::new(&gpu.host.instance, &gpu.device);
     let target = Target::new(&gpu, TargetPlan::default())?;
-    let tints = tints(&gpu, 4, Kind::UNIFORM_BUFFER)?;
+    let tints = tints(&gpu, &PARTS, Kind::UNIFORM_BUFFER)?;
     let pushed = vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR;
     let pushed = set_layout(&gpu, Kind::UNIFORM_BUFFER, pushed)?;
     let layout = layout(&gpu, &[tints.layouts[0], pushed], SHAPE)?;

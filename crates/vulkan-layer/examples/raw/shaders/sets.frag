@@ -1,5 +1,5 @@
 #version 450
-// A tint in each of the first SETS descriptor sets.
+// A part of a tint in each of the first SETS descriptor sets.
 layout(location = 0) in vec4 colour;
 layout(location = 1) flat in uint instance;
 layout(location = 0) out vec4 target;
@@ -36,5 +36,5 @@ void main() {
 #if SETS > 7
     tint += tint7.value;
 #endif
-    target = colour * tint / SETS;
+    target = colour * tint;
 }
