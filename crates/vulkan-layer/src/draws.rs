@@ -84,6 +84,7 @@ fn apart(d: &Device, buffer: vk::CommandBuffer) -> bool {
 
 const INDEXED_BY_DRAW: &str =
     "its shader asks for gl_DrawID, so that its draws cannot be told apart";
+const SEVERAL: &str = "it is a multi-draw of several instances, the order of which drivers choose";
 const COUNTED: &str = "the number of its draws lies in a buffer, so that they cannot be told apart";
 
 pub(crate) unsafe extern "system" fn draw(
@@ -184,6 +185,17 @@ pub(crate) unsafe extern "system" fn draw_byte_count(
     next!(next, buffer, instances, first_instance, counter, counter_offset, offset, stride)
 }
 
+/// Why the parts of a multi-draw have to be drawn at once. Of several instances a driver may draw all
+/// parts of one after the other (Mesa's lavapipe 22.3 does), in which the picture would change.
+fn together(d: &Device, buffer: vk::CommandBuffer, n: u32, instances: u32) -> Option<&'static str> {
+    match () {
+        () if n <= 1 => None,
+        () if !apart(d, buffer) => Some(INDEXED_BY_DRAW),
+        () if instances > 1 => Some(SEVERAL),
+        () => None,
+    }
+}
+
 /// The `at`th of values that lie `stride` bytes apart.
 unsafe fn at<T: Copy>(first: *const T, at: u32, stride: u32) -> *const T {
     unsafe { first.byte_add(at as usize * stride as usize) }
@@ -200,8 +212,7 @@ pub(crate) unsafe extern "system" fn draw_multi(
     let Some(d) = (unsafe { device(buffer) }) else { return };
     let name = "vkCmdDrawMultiEXT";
     let next = d.table.draw_multi;
-    if n > 1 && !apart(&d, buffer) {
-        let refused = INDEXED_BY_DRAW;
+    if let Some(refused) = together(&d, buffer, n, instances) {
         before(&d, buffer, Command { name, instances, refused, vertices: 0 });
         return next!(next, buffer, n, draws, instances, first_instance, stride);
     }
@@ -225,8 +236,7 @@ pub(crate) unsafe extern "system" fn draw_multi_indexed(
     let Some(d) = (unsafe { device(buffer) }) else { return };
     let name = "vkCmdDrawMultiIndexedEXT";
     let next = d.table.draw_multi_indexed;
-    if n > 1 && !apart(&d, buffer) {
-        let refused = INDEXED_BY_DRAW;
+    if let Some(refused) = together(&d, buffer, n, instances) {
         before(&d, buffer, Command { name, instances, refused, vertices: 0 });
         return next!(next, buffer, n, draws, instances, first_instance, stride, offset);
     }
