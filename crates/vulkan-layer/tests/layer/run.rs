@@ -15,7 +15,7 @@ fn deps() -> PathBuf {
 }
 
 /// The test program.
-pub(crate) fn program() -> PathBuf {
+fn program() -> PathBuf {
     deps().parent().unwrap().join("examples").join("raw")
 }
 
