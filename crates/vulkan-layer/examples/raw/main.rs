@@ -3,7 +3,8 @@
 //! `raw CASE OUT [NUMBER]` writes the finished target's bytes to OUT: rows of texels of the
 //! target's format, of RGBA8 where a case does not say otherwise; where several images or layers
 //! are drawn to, one after the other. `raw --list` names the cases. What the device cannot do ends
-//! with status 3.
+//! with status 3. Cases with frames present them where there is a surface without a window or an X
+//! display, in BGRA8 if that is the surface's format, and submit them otherwise.
 
 mod cases;
 mod chain;
@@ -18,6 +19,7 @@ mod scene;
 mod shader;
 mod surface;
 mod target;
+mod window;
 
 use std::path::PathBuf;
 use std::process::ExitCode;

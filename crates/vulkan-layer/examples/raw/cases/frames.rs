@@ -123,7 +123,7 @@ pub(super) fn forever(call: &Call) -> Result<()> {
     let gpu = &show.gpu;
     let (mut chain, plan) = show.chain(EXTENT, None)?;
     let pipeline = plan.create(gpu)?;
-    let start = Instant::now();
+    let (start, mut written) = (Instant::now(), false);
     for i in (0..=u8::MAX).cycle() {
         let mut used = None;
         chain.frame(gpu, |chain, image| {
@@ -133,8 +133,9 @@ pub(super) fn forever(call: &Call) -> Result<()> {
         })?;
         // SAFETY: the frame is done.
         unsafe { gpu.device.free_command_buffers(gpu.pool, used.as_slice()) }
-        if !call.out.exists() {
+        if !written {
             std::fs::write(&call.out, chain.picture.read(gpu)?)?;
+            written = true;
         }
         if start.elapsed() > Duration::from_secs(30) {
             break;

@@ -1,17 +1,23 @@
 //! Processes that start others, and that end in other ways than most.
 
 use std::ffi::c_int;
-use std::os::unix::process::CommandExt;
 use std::process::Command;
 
+use crate::Call;
+#[cfg(unix)]
+use crate::draw;
 use crate::failure::{Failure, Result};
 use crate::gpu::Gpu;
+#[cfg(unix)]
 use crate::host::Host;
 use crate::target::TargetPlan;
-use crate::{Call, draw};
 
 unsafe extern "C" {
     fn raise(signal: c_int) -> c_int;
+}
+
+#[cfg(unix)]
+unsafe extern "C" {
     fn fork() -> c_int;
     fn waitpid(process: c_int, status: *mut c_int, options: c_int) -> c_int;
 }
@@ -36,7 +42,17 @@ pub(super) fn child(call: &Call) -> Result<()> {
     if status.success() { Ok(()) } else { Err(Failure::Failed(format!("the child: {status}"))) }
 }
 
+/// Neither copies of a process nor programs in place of others.
+#[cfg(not(unix))]
+pub(super) fn forked(_: &Call) -> Result<()> {
+    Err(Failure::unsupported("not on this system"))
+}
+
+#[cfg(not(unix))]
+pub(super) use forked as launcher;
+
 /// A copy of this process draws; this one had an instance and a device first, and draws nothing.
+#[cfg(unix)]
 pub(super) fn forked(call: &Call) -> Result<()> {
     // The device is gone before, and with it the driver's threads, which a copy would lack.
     drop(Gpu::plain()?);
@@ -58,7 +74,9 @@ pub(super) fn forked(call: &Call) -> Result<()> {
 }
 
 /// This process becomes another program, which draws.
+#[cfg(unix)]
 pub(super) fn launcher(call: &Call) -> Result<()> {
+    use std::os::unix::process::CommandExt;
     drop(Host::new()?);
     Err(this_program("plain", call)?.exec().into())
 }
