@@ -21,12 +21,18 @@ use crate::table::next;
 #[derive(Clone)]
 pub(crate) enum Step {
     Event(Event),
-    /// An image is in this layout from here on.
-    Layout(u64, vk::ImageLayout),
     /// Secondary command buffers.
     Execute(Vec<u64>),
     /// It waits for an event, which the host may set.
     Waits,
+}
+
+/// What it does to images' layouts, which are followed whether or not anything is captured.
+pub(crate) enum Move {
+    /// An image is in this layout from here on.
+    Layout(u64, vk::ImageLayout),
+    /// Secondary command buffers.
+    Execute(Vec<u64>),
 }
 
 /// A pass that has begun.
@@ -40,6 +46,7 @@ pub(crate) enum Open {
 #[derive(Default)]
 pub(crate) struct Commands {
     pub steps: Vec<Step>,
+    pub moves: Vec<Move>,
     pub slots: Vec<u32>,
     pub pipeline: Option<Arc<Pipeline>>,
     pub dynamic: Dynamic,
@@ -235,7 +242,8 @@ pub(crate) unsafe extern "system" fn execute(
 ) {
     let Some(d) = (unsafe { device(buffer) }) else { return };
     with(&d, buffer, |commands| {
-        let all = unsafe { slice(buffers, n) }.iter().map(|b| b.as_raw()).collect();
+        let all: Vec<u64> = unsafe { slice(buffers, n) }.iter().map(|b| b.as_raw()).collect();
+        commands.moves.push(Move::Execute(all.clone()));
         commands.steps.push(Step::Execute(all));
         // What they leave bound is undefined.
         commands.pipeline = None;
@@ -332,10 +340,9 @@ fn transitions(
     all: impl Iterator<Item = (vk::Image, vk::ImageLayout, vk::ImageLayout)>,
 ) {
     with_objects(d, |objects| {
-        for (image, before, after) in all.filter(|(_, before, after)| before != after) {
-            let _ = before;
+        for (image, _, after) in all.filter(|(_, before, after)| before != after) {
             let Some(image) = objects.image(image).map(|image| image.number) else { continue };
-            objects.recording(buffer).steps.push(Step::Layout(image, after));
+            objects.recording(buffer).moves.push(Move::Layout(image, after));
         }
     });
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use ash::vk::{self, Handle};
 
 use crate::abi::{find, slice};
-use crate::commands::{Open, Step, with_objects};
+use crate::commands::{Move, Open, Step, with_objects};
 use crate::device::{SETTINGS, device};
 use crate::guard;
 use crate::log;
@@ -264,8 +264,8 @@ fn end(buffer: vk::CommandBuffer) {
             Some(Open::Rendering(layouts)) => layouts,
             None => Vec::new(),
         };
-        let steps = layouts.into_iter().map(|(image, layout)| Step::Layout(image, layout));
-        objects.recording(buffer).steps.extend(steps);
+        let moves = layouts.into_iter().map(|(image, layout)| Move::Layout(image, layout));
+        objects.recording(buffer).moves.extend(moves);
     });
 }
 

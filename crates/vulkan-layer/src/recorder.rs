@@ -409,6 +409,11 @@ impl Recorder {
         }
     }
 
+    /// Whether the log tells of a pipeline.
+    pub(crate) fn told(&self, pipeline: u64) -> bool {
+        self.logged.contains(&(false, pipeline))
+    }
+
     /// Tells of a pipeline before it is first named.
     pub(crate) fn pipeline(&mut self, pipeline: log::Pipeline) {
         if self.logged.insert((false, pipeline.number)) {

@@ -7,7 +7,7 @@ use std::time::Duration;
 use ash::vk::{self, Handle};
 
 use crate::abi::{find, slice};
-use crate::commands::Step;
+use crate::commands::{Move, Step};
 use crate::device::{Device, SETTINGS, device};
 use crate::guard;
 use crate::log::Event;
@@ -140,8 +140,28 @@ struct Plan {
     short: bool,
 }
 
+/// Follows the layouts of images through a command buffer.
+fn follow(objects: &mut Objects, buffer: u64) {
+    let Some(commands) = objects.commands.get_mut(&buffer) else { return };
+    let moves = std::mem::take(&mut commands.moves);
+    for step in &moves {
+        match step {
+            Move::Layout(image, layout) => {
+                if let Some(image) = objects.images.get_mut(image) {
+                    image.layout = *layout;
+                }
+            }
+            Move::Execute(all) => all.iter().for_each(|buffer| follow(objects, *buffer)),
+        }
+    }
+    // It may be submitted again.
+    if let Some(commands) = objects.commands.get_mut(&buffer) {
+        commands.moves = moves;
+    }
+}
+
 /// What command buffers do, secondaries in their places, and whether they wait for the host.
-fn flatten(objects: &mut Objects, buffer: u64, steps: &mut Vec<Step>) {
+fn flatten(objects: &Objects, buffer: u64, steps: &mut Vec<Step>) {
     let own = objects.commands.get(&buffer).map(|c| c.steps.clone()).unwrap_or_default();
     for step in own {
         match step {
@@ -183,17 +203,19 @@ fn prepare(
 ) -> Option<Plan> {
     let number = recorder.submission;
     recorder.submission += 1;
+    let mut objects = d.objects();
     if !recorder.wants(number) || !d.resources.usable() {
+        buffers.iter().for_each(|b| follow(&mut objects, b.as_raw()));
         return None;
     }
+    drop(objects);
     settle_within(d, recorder);
     let mut steps = Vec::new();
-    let mut objects = d.objects();
-    buffers.iter().for_each(|b| flatten(&mut objects, b.as_raw(), &mut steps));
+    objects = d.objects();
+    buffers.iter().for_each(|b| flatten(&objects, b.as_raw(), &mut steps));
     let mut short = false;
     let mut events = Vec::new();
     let (mut drawn, mut loaded) = (BTreeSet::new(), Vec::new());
-    let mut layouts = Vec::new();
     for step in steps {
         match step {
             Step::Event(event) => {
@@ -211,17 +233,12 @@ fn prepare(
                 }
                 events.push(event);
             }
-            Step::Layout(image, layout) => layouts.push((image, layout)),
             Step::Waits => short = true,
             Step::Execute(_) => {}
         }
     }
     let images: Vec<Image> = loaded.iter().filter_map(|n| objects.images.get(n).cloned()).collect();
-    for (image, layout) in layouts {
-        if let Some(image) = objects.images.get_mut(&image) {
-            image.layout = layout;
-        }
-    }
+    buffers.iter().for_each(|b| follow(&mut objects, b.as_raw()));
     drop(objects);
     refuse_twins(&mut events);
     short |= waits_for_later(d, waits);
@@ -271,7 +288,7 @@ fn tell(d: &Device, recorder: &mut Recorder, events: &[Event]) {
                     }
                 }
             }
-            Event::Draw(draw) => {
+            Event::Draw(draw) if !recorder.told(draw.pipeline) => {
                 let mut all = objects.pipelines.values();
                 if let Some(pipeline) = all.find(|p| p.number == draw.pipeline) {
                     recorder.pipeline(pipeline.log());
@@ -282,7 +299,7 @@ fn tell(d: &Device, recorder: &mut Recorder, events: &[Event]) {
                     recorder.image(image.log());
                 }
             }
-            Event::Clear(_) => {}
+            Event::Draw(_) | Event::Clear(_) => {}
         }
     }
 }
