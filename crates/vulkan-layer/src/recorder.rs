@@ -2,8 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
-use std::io::Write;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::io::{ErrorKind, Write};
+use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 use ash::vk;
@@ -293,18 +293,31 @@ struct Open {
     pictures: File,
 }
 
+impl Open {
+    /// The files of the first number that is free: where the loader has let this library go and
+    /// opened it again, nothing here tells how many there are.
+    fn create(folder: &Path, process: u32) -> Option<Self> {
+        for n in 0..MOST_DEVICES {
+            let files = Files::new(folder, process, n);
+            let log = match File::create_new(&files.log) {
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => continue,
+                log => log.ok()?,
+            };
+            let records = File::create_new(&files.records).ok()?;
+            let pictures = File::create_new(&files.pictures).ok()?;
+            return Some(Self { files, log, records, pictures });
+        }
+        None
+    }
+}
+
+/// Devices of one process, at most.
+const MOST_DEVICES: u32 = 10_000;
+
 impl Recorder {
     pub(crate) fn open(settings: &Settings, properties: &vk::PhysicalDeviceProperties) -> Self {
-        static DEVICES: AtomicU32 = AtomicU32::new(0);
-        let n = DEVICES.fetch_add(1, Ordering::Relaxed);
         let process = std::process::id();
-        let open = settings.folder.as_ref().and_then(|folder| {
-            let files = Files::new(folder, process, n);
-            let create = |path| File::create_new(path);
-            let (log, records) = (create(&files.log).ok()?, create(&files.records).ok()?);
-            let pictures = create(&files.pictures).ok()?;
-            Some(Open { files, log, records, pictures })
-        });
+        let open = settings.folder.as_ref().and_then(|folder| Open::create(folder, process));
         if open.is_none() {
             eprintln!("screendoor: the capture's folder cannot be written; nothing is captured");
         }
