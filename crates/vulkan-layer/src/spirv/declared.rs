@@ -63,6 +63,17 @@ pub(super) struct Variable {
 /// What is decorated: an id, or a member of a structure.
 type Place = (u32, Option<u32>);
 
+/// Decorations that matter here; others are not kept.
+const KEPT: [u32; 7] = [
+    decoration::BUILT_IN,
+    decoration::SAMPLE,
+    decoration::LOCATION,
+    decoration::COMPONENT,
+    decoration::INDEX,
+    decoration::DESCRIPTOR_SET,
+    decoration::PER_VERTEX,
+];
+
 /// What a module declares.
 #[derive(Debug, Default)]
 pub(super) struct Declared {
@@ -76,8 +87,6 @@ pub(super) struct Declared {
     pub(super) known: BTreeMap<Vec<u32>, u32>,
     pub(super) variables: BTreeMap<u32, Variable>,
     decorations: BTreeMap<(Place, u32), u32>,
-    /// Decoration groups of what is decorated.
-    groups: BTreeMap<Place, Vec<u32>>,
     /// Which member of a structure is this built-in.
     built_in_members: BTreeMap<(u32, u32), u32>,
     /// Structures with a member that is interpolated for each sample.
@@ -109,26 +118,17 @@ impl Declared {
             }
             op::DECORATE => self.decorate((at(0)?, None), at(1)?, operands.get(2)),
             op::MEMBER_DECORATE => {
-                let (id, member, decoration) = (at(0)?, at(1)?, at(2)?);
-                self.decorate((id, Some(member)), decoration, operands.get(3));
-                self.note_member(id, member, decoration, operands.get(3).copied().unwrap_or(0));
+                self.decorate((at(0)?, Some(at(1)?)), at(2)?, operands.get(3));
             }
+            // A group is decorated before it decorates.
             op::GROUP_DECORATE => {
                 let group = at(0)?;
-                for target in &operands[1..] {
-                    self.groups.entry((*target, None)).or_default().push(group);
-                }
+                operands[1..].iter().for_each(|id| self.decorate_as(group, (*id, None)));
             }
             op::GROUP_MEMBER_DECORATE => {
                 let group = at(0)?;
                 for pair in operands[1..].chunks_exact(2) {
-                    let (id, member) = (pair[0], pair[1]);
-                    self.groups.entry((id, Some(member))).or_default().push(group);
-                    for noted in [decoration::BUILT_IN, decoration::SAMPLE] {
-                        if let Some(value) = self.decorations.get(&((group, None), noted)) {
-                            self.note_member(id, member, noted, *value);
-                        }
-                    }
+                    self.decorate_as(group, (pair[0], Some(pair[1])));
                 }
             }
             op::CONSTANT => {
@@ -164,39 +164,42 @@ impl Declared {
     }
 
     fn decorate(&mut self, place: Place, decoration: u32, value: Option<&u32>) {
+        if !KEPT.contains(&decoration) {
+            return;
+        }
         let value = value.copied().unwrap_or(0);
         self.decorations.entry((place, decoration)).or_insert(value);
-    }
-
-    /// Keeps what is asked of a structure's members, so that nobody has to go through them.
-    fn note_member(&mut self, id: u32, member: u32, decoration: u32, value: u32) {
-        match decoration {
-            decoration::BUILT_IN => {
-                self.built_in_members.entry((id, value)).or_insert(member);
+        // What is asked of a structure is kept with it, so that nobody has to go through its
+        // members.
+        if let (id, Some(member)) = place {
+            match decoration {
+                decoration::BUILT_IN => {
+                    self.built_in_members.entry((id, value)).or_insert(member);
+                }
+                decoration::SAMPLE => {
+                    self.sampled.insert(id);
+                }
+                _ => {}
             }
-            decoration::SAMPLE => {
-                self.sampled.insert(id);
-            }
-            _ => {}
         }
     }
 
-    fn decorated(&self, place: Place, decoration: u32) -> Option<u32> {
-        let own = self.decorations.get(&(place, decoration));
-        own.copied().or_else(|| {
-            let groups = self.groups.get(&place)?;
-            groups.iter().find_map(|g| self.decorations.get(&((*g, None), decoration)).copied())
-        })
+    fn decorate_as(&mut self, group: u32, place: Place) {
+        for decoration in KEPT {
+            if let Some(value) = self.decoration(group, decoration) {
+                self.decorate(place, decoration, Some(&value));
+            }
+        }
     }
 
     /// A decoration's first operand, or 0 where it has none.
     pub(super) fn decoration(&self, id: u32, decoration: u32) -> Option<u32> {
-        self.decorated((id, None), decoration)
+        self.decorations.get(&((id, None), decoration)).copied()
     }
 
     /// The same of a member of a structure.
     pub(super) fn member_decoration(&self, id: u32, member: u32, decoration: u32) -> Option<u32> {
-        self.decorated((id, Some(member)), decoration)
+        self.decorations.get(&((id, Some(member)), decoration)).copied()
     }
 
     /// Which member of a structure is built in so.
