@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::module::{Instruction, Module, Result};
-use super::spec::{decoration, op, version};
+use super::spec::{decoration, op};
 
 /// A type; others than these are left alone.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -58,6 +58,8 @@ pub(super) struct Variable {
     pub(super) class: u32,
     /// The type that is pointed to.
     pub(super) to: u32,
+    /// Whether it has a value from the beginning.
+    pub(super) initialized: bool,
 }
 
 /// What is decorated: an id, or a member of a structure.
@@ -143,7 +145,8 @@ impl Declared {
             op::VARIABLE => {
                 let (pointer, id, class) = (at(0)?, at(1)?, at(2)?);
                 if let Some(Type::Pointer { to, .. }) = self.types.get(&pointer) {
-                    let variable = Variable { class, to: *to };
+                    let initialized = operands.len() > 3;
+                    let variable = Variable { class, to: *to, initialized };
                     self.variables.entry(id).or_insert(variable);
                 }
             }
@@ -229,84 +232,4 @@ impl Declared {
             _ => None,
         }
     }
-}
-
-/// An entry point and what it can see.
-#[derive(Debug)]
-pub(super) struct Entry {
-    /// Which instruction declares it.
-    pub(super) at: usize,
-    pub(super) function: u32,
-    pub(super) name: Vec<u32>,
-    /// Variables as they are listed.
-    pub(super) listed: Vec<u32>,
-    /// Inputs and outputs among them, each once.
-    pub(super) interface: BTreeSet<u32>,
-    /// Those that appear in a function.
-    pub(super) used: BTreeSet<u32>,
-}
-
-impl Entry {
-    pub(super) fn find(
-        module: &Module,
-        declared: &Declared,
-        model: u32,
-        entry: &str,
-    ) -> Result<Self> {
-        let (at, (function, listed)) = module
-            .declarations()
-            .iter()
-            .enumerate()
-            .find_map(|(n, i)| Some((n, named(i, model, entry)?)))
-            .ok_or_else(|| format!("the module has no entry point '{entry}' of this stage"))?;
-        let interface: BTreeSet<u32> =
-            listed.iter().copied().filter(|id| declared.variables.contains_key(id)).collect();
-        let used = module
-            .bodies()
-            .iter()
-            .flat_map(Instruction::ids)
-            .filter(|id| interface.contains(id))
-            .collect();
-        let entry = Self {
-            at,
-            function,
-            name: super::module::string_words(entry.as_bytes()),
-            listed: listed.to_vec(),
-            interface,
-            used,
-        };
-        entry.check(module, declared)?;
-        Ok(entry)
-    }
-
-    /// It is called by the new one, so that it has to be what an entry point has to be.
-    fn check(&self, module: &Module, declared: &Declared) -> Result<()> {
-        let function = module
-            .bodies()
-            .iter()
-            .find(|i| i.op() == op::FUNCTION && i.operand(1) == Ok(self.function))
-            .ok_or("the entry point's function is missing")?;
-        let returns = match declared.ty(function.operand(3)?) {
-            Some(Type::Function { returns, parameters: 0 }) => declared.ty(*returns),
-            _ => None,
-        };
-        if returns != Some(&Type::Void) {
-            return Err("the entry point's function takes or returns something".into());
-        }
-        Ok(())
-    }
-}
-
-/// Function and listed variables of an entry point of this stage and name.
-fn named<'a>(i: &Instruction<'a>, model: u32, entry: &str) -> Option<(u32, &'a [u32])> {
-    if i.op() != op::ENTRY_POINT || i.operand(0) != Ok(model) {
-        return None;
-    }
-    let (name, listed) = super::module::string(i.operands().get(2..)?)?;
-    (name == entry.as_bytes()).then_some((i.operand(1).ok()?, listed))
-}
-
-/// Whether entry points list all variables, and not inputs and outputs alone.
-pub(super) fn lists_all(module: &Module) -> bool {
-    module.version() >= version::V1_4
 }
