@@ -32,6 +32,7 @@ impl Colour {
         let locations = Locations::new(declared);
         let mut colour = Self { parts: Vec::new(), output: Output::None };
         let mut taken = [false; 4];
+        let mut unknown = None;
         for id in &e.entry.interface {
             let Some(variable) = declared.variables.get(id).filter(|v| v.class == class::OUTPUT)
             else {
@@ -45,8 +46,13 @@ impl Colour {
             let Some(first) = decorated(decoration::LOCATION) else {
                 continue;
             };
-            let Some((indices, ty)) = locations.part(variable.to, first, location)? else {
-                continue;
+            let (indices, ty) = match locations.part(variable.to, first, location) {
+                Ok(Some(part)) => part,
+                Ok(None) => continue,
+                Err(reason) => {
+                    unknown = Some(reason);
+                    continue;
+                }
             };
             let strange = || format!("the output at location {location} is of an unknown type");
             let (of, n) = declared.components(ty).ok_or_else(strange)?;
@@ -67,7 +73,11 @@ impl Colour {
             };
             colour.parts.push(Part { variable: *id, indices, ty, component, n });
         }
-        Ok(colour)
+        // What may or may not reach as far does not where another lies.
+        match unknown {
+            Some(reason) if colour.parts.is_empty() => Err(reason),
+            _ => Ok(colour),
+        }
     }
 
     /// Loads the four components; what is not written is 0, and alpha 1.

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::module::{Instruction, Module, Result};
-use super::spec::{decoration, op, version};
+use super::spec::{decoration, op};
 
 /// A type; others than these are left alone.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -58,10 +58,23 @@ pub(super) struct Variable {
     pub(super) class: u32,
     /// The type that is pointed to.
     pub(super) to: u32,
+    /// Whether it has a value from the beginning.
+    pub(super) initialized: bool,
 }
 
 /// What is decorated: an id, or a member of a structure.
 type Place = (u32, Option<u32>);
+
+/// Decorations that matter here; others are not kept.
+const KEPT: [u32; 7] = [
+    decoration::BUILT_IN,
+    decoration::SAMPLE,
+    decoration::LOCATION,
+    decoration::COMPONENT,
+    decoration::INDEX,
+    decoration::DESCRIPTOR_SET,
+    decoration::PER_VERTEX,
+];
 
 /// What a module declares.
 #[derive(Debug, Default)]
@@ -76,8 +89,6 @@ pub(super) struct Declared {
     pub(super) known: BTreeMap<Vec<u32>, u32>,
     pub(super) variables: BTreeMap<u32, Variable>,
     decorations: BTreeMap<(Place, u32), u32>,
-    /// Decoration groups of what is decorated.
-    groups: BTreeMap<Place, Vec<u32>>,
     /// Which member of a structure is this built-in.
     built_in_members: BTreeMap<(u32, u32), u32>,
     /// Structures with a member that is interpolated for each sample.
@@ -109,26 +120,17 @@ impl Declared {
             }
             op::DECORATE => self.decorate((at(0)?, None), at(1)?, operands.get(2)),
             op::MEMBER_DECORATE => {
-                let (id, member, decoration) = (at(0)?, at(1)?, at(2)?);
-                self.decorate((id, Some(member)), decoration, operands.get(3));
-                self.note_member(id, member, decoration, operands.get(3).copied().unwrap_or(0));
+                self.decorate((at(0)?, Some(at(1)?)), at(2)?, operands.get(3));
             }
+            // A group is decorated before it decorates.
             op::GROUP_DECORATE => {
                 let group = at(0)?;
-                for target in &operands[1..] {
-                    self.groups.entry((*target, None)).or_default().push(group);
-                }
+                operands[1..].iter().for_each(|id| self.decorate_as(group, (*id, None)));
             }
             op::GROUP_MEMBER_DECORATE => {
                 let group = at(0)?;
                 for pair in operands[1..].chunks_exact(2) {
-                    let (id, member) = (pair[0], pair[1]);
-                    self.groups.entry((id, Some(member))).or_default().push(group);
-                    for noted in [decoration::BUILT_IN, decoration::SAMPLE] {
-                        if let Some(value) = self.decorations.get(&((group, None), noted)) {
-                            self.note_member(id, member, noted, *value);
-                        }
-                    }
+                    self.decorate_as(group, (pair[0], Some(pair[1])));
                 }
             }
             op::CONSTANT => {
@@ -143,7 +145,8 @@ impl Declared {
             op::VARIABLE => {
                 let (pointer, id, class) = (at(0)?, at(1)?, at(2)?);
                 if let Some(Type::Pointer { to, .. }) = self.types.get(&pointer) {
-                    let variable = Variable { class, to: *to };
+                    let initialized = operands.len() > 3;
+                    let variable = Variable { class, to: *to, initialized };
                     self.variables.entry(id).or_insert(variable);
                 }
             }
@@ -164,39 +167,42 @@ impl Declared {
     }
 
     fn decorate(&mut self, place: Place, decoration: u32, value: Option<&u32>) {
+        if !KEPT.contains(&decoration) {
+            return;
+        }
         let value = value.copied().unwrap_or(0);
         self.decorations.entry((place, decoration)).or_insert(value);
-    }
-
-    /// Keeps what is asked of a structure's members, so that nobody has to go through them.
-    fn note_member(&mut self, id: u32, member: u32, decoration: u32, value: u32) {
-        match decoration {
-            decoration::BUILT_IN => {
-                self.built_in_members.entry((id, value)).or_insert(member);
+        // What is asked of a structure is kept with it, so that nobody has to go through its
+        // members.
+        if let (id, Some(member)) = place {
+            match decoration {
+                decoration::BUILT_IN => {
+                    self.built_in_members.entry((id, value)).or_insert(member);
+                }
+                decoration::SAMPLE => {
+                    self.sampled.insert(id);
+                }
+                _ => {}
             }
-            decoration::SAMPLE => {
-                self.sampled.insert(id);
-            }
-            _ => {}
         }
     }
 
-    fn decorated(&self, place: Place, decoration: u32) -> Option<u32> {
-        let own = self.decorations.get(&(place, decoration));
-        own.copied().or_else(|| {
-            let groups = self.groups.get(&place)?;
-            groups.iter().find_map(|g| self.decorations.get(&((*g, None), decoration)).copied())
-        })
+    fn decorate_as(&mut self, group: u32, place: Place) {
+        for decoration in KEPT {
+            if let Some(value) = self.decoration(group, decoration) {
+                self.decorate(place, decoration, Some(&value));
+            }
+        }
     }
 
     /// A decoration's first operand, or 0 where it has none.
     pub(super) fn decoration(&self, id: u32, decoration: u32) -> Option<u32> {
-        self.decorated((id, None), decoration)
+        self.decorations.get(&((id, None), decoration)).copied()
     }
 
     /// The same of a member of a structure.
     pub(super) fn member_decoration(&self, id: u32, member: u32, decoration: u32) -> Option<u32> {
-        self.decorated((id, Some(member)), decoration)
+        self.decorations.get(&((id, Some(member)), decoration)).copied()
     }
 
     /// Which member of a structure is built in so.
@@ -226,84 +232,4 @@ impl Declared {
             _ => None,
         }
     }
-}
-
-/// An entry point and what it can see.
-#[derive(Debug)]
-pub(super) struct Entry {
-    /// Which instruction declares it.
-    pub(super) at: usize,
-    pub(super) function: u32,
-    pub(super) name: Vec<u32>,
-    /// Variables as they are listed.
-    pub(super) listed: Vec<u32>,
-    /// Inputs and outputs among them, each once.
-    pub(super) interface: BTreeSet<u32>,
-    /// Those that appear in a function.
-    pub(super) used: BTreeSet<u32>,
-}
-
-impl Entry {
-    pub(super) fn find(
-        module: &Module,
-        declared: &Declared,
-        model: u32,
-        entry: &str,
-    ) -> Result<Self> {
-        let (at, (function, listed)) = module
-            .declarations()
-            .iter()
-            .enumerate()
-            .find_map(|(n, i)| Some((n, named(i, model, entry)?)))
-            .ok_or_else(|| format!("the module has no entry point '{entry}' of this stage"))?;
-        let interface: BTreeSet<u32> =
-            listed.iter().copied().filter(|id| declared.variables.contains_key(id)).collect();
-        let used = module
-            .bodies()
-            .iter()
-            .flat_map(Instruction::ids)
-            .filter(|id| interface.contains(id))
-            .collect();
-        let entry = Self {
-            at,
-            function,
-            name: super::module::string_words(entry.as_bytes()),
-            listed: listed.to_vec(),
-            interface,
-            used,
-        };
-        entry.check(module, declared)?;
-        Ok(entry)
-    }
-
-    /// It is called by the new one, so that it has to be what an entry point has to be.
-    fn check(&self, module: &Module, declared: &Declared) -> Result<()> {
-        let function = module
-            .bodies()
-            .iter()
-            .find(|i| i.op() == op::FUNCTION && i.operand(1) == Ok(self.function))
-            .ok_or("the entry point's function is missing")?;
-        let returns = match declared.ty(function.operand(3)?) {
-            Some(Type::Function { returns, parameters: 0 }) => declared.ty(*returns),
-            _ => None,
-        };
-        if returns != Some(&Type::Void) {
-            return Err("the entry point's function takes or returns something".into());
-        }
-        Ok(())
-    }
-}
-
-/// Function and listed variables of an entry point of this stage and name.
-fn named<'a>(i: &Instruction<'a>, model: u32, entry: &str) -> Option<(u32, &'a [u32])> {
-    if i.op() != op::ENTRY_POINT || i.operand(0) != Ok(model) {
-        return None;
-    }
-    let (name, listed) = super::module::string(i.operands().get(2..)?)?;
-    (name == entry.as_bytes()).then_some((i.operand(1).ok()?, listed))
-}
-
-/// Whether entry points list all variables, and not inputs and outputs alone.
-pub(super) fn lists_all(module: &Module) -> bool {
-    module.version() >= version::V1_4
 }

@@ -3,9 +3,10 @@
 
 use std::collections::BTreeSet;
 
-use super::declared::{Declared, Entry, Type, Variable, lists_all};
+use super::declared::{Declared, Type, Variable};
+use super::entry::{Entry, lists_all};
 use super::locations::Locations;
-use super::module::{HEADER, Module, Result, instruction, string_words};
+use super::module::{Module, Result, instruction, string_words};
 use super::spec::{class, decoration, memory, op};
 
 /// Ids below this are left to grow from, far above what any compiler gives.
@@ -24,15 +25,15 @@ pub(super) struct Editor<'a> {
     pub(super) module: &'a Module<'a>,
     pub(super) declared: Declared,
     pub(super) entry: Entry,
-    bound: u32,
+    pub(super) bound: u32,
     /// Variables of the new entry point.
-    listed: Vec<u32>,
-    capabilities: BTreeSet<u32>,
-    extensions: BTreeSet<&'static str>,
-    addressing: Option<u32>,
-    decorations: Vec<u32>,
-    globals: Vec<u32>,
-    function: Vec<u32>,
+    pub(super) listed: Vec<u32>,
+    pub(super) capabilities: BTreeSet<u32>,
+    pub(super) extensions: BTreeSet<&'static str>,
+    pub(super) addressing: Option<u32>,
+    pub(super) decorations: Vec<u32>,
+    pub(super) globals: Vec<u32>,
+    pub(super) function: Vec<u32>,
 }
 
 impl<'a> Editor<'a> {
@@ -135,6 +136,12 @@ impl<'a> Editor<'a> {
         self.unique(op::TYPE_POINTER, &[class, to], Type::Pointer { class, to })
     }
 
+    /// Of functions that take and return nothing.
+    pub(super) fn procedure(&mut self) -> u32 {
+        let returns = self.void();
+        self.unique(op::TYPE_FUNCTION, &[returns], Type::Function { returns, parameters: 0 })
+    }
+
     pub(super) fn array(&mut self, of: u32, n: u32) -> u32 {
         let length = self.constant(n);
         self.aggregate(op::TYPE_ARRAY, &[of, length], Type::Array { of, length })
@@ -184,7 +191,7 @@ impl<'a> Editor<'a> {
         let pointer = self.pointer(class, to);
         let id = self.id();
         self.globals.extend(instruction(op::VARIABLE, &[pointer, id, class]));
-        self.declared.variables.insert(id, Variable { class, to });
+        self.declared.variables.insert(id, Variable { class, to, initialized: false });
         if lists_all(self.module) || matches!(class, class::INPUT | class::OUTPUT) {
             self.listed.push(id);
         }
@@ -230,170 +237,4 @@ impl<'a> Editor<'a> {
         }
         Ok(())
     }
-
-    /// Loads an integer, or the first of an array of them, as unsigned.
-    pub(super) fn load_integer(&mut self, class: u32, from: BuiltIn, name: &str) -> Result<u32> {
-        let mut indices: Vec<u32> = from.member.into_iter().collect();
-        let mut ty = from.ty;
-        if let Some(Type::Array { of, .. }) = self.declared.ty(ty) {
-            indices.push(0);
-            ty = *of;
-        }
-        if self.declared.ty(ty) != Some(&Type::Int { width: 32 }) {
-            return Err(format!("{name} is of an unknown type"));
-        }
-        let uint = self.uint();
-        let value = self.load(class, from.variable, &indices, ty);
-        Ok(if ty == uint { value } else { self.value(op::BITCAST, uint, &[value]) })
-    }
-
-    /// An instruction of the new function without a result.
-    pub(super) fn put(&mut self, op: u32, operands: &[u32]) {
-        self.function.extend(instruction(op, operands));
-    }
-
-    /// One with a result.
-    pub(super) fn value(&mut self, op: u32, ty: u32, operands: &[u32]) -> u32 {
-        let id = self.id();
-        self.put(op, &[&[ty, id], operands].concat());
-        id
-    }
-
-    /// Loads what lies at these members and elements of a variable.
-    pub(super) fn load(&mut self, class: u32, variable: u32, indices: &[u32], ty: u32) -> u32 {
-        let mut from = variable;
-        if !indices.is_empty() {
-            from = self.element(class, variable, indices, ty);
-        }
-        self.value(op::LOAD, ty, &[from])
-    }
-
-    /// A pointer to it.
-    pub(super) fn element(&mut self, class: u32, base: u32, indices: &[u32], ty: u32) -> u32 {
-        let pointer = self.pointer(class, ty);
-        let mut operands = vec![base];
-        for index in indices {
-            operands.push(self.constant(*index));
-        }
-        self.value(op::ACCESS_CHAIN, pointer, &operands)
-    }
-
-    /// Begins the new function; returns its id.
-    pub(super) fn begin(&mut self) -> u32 {
-        let void = self.void();
-        let ty = Type::Function { returns: void, parameters: 0 };
-        let ty = self.unique(op::TYPE_FUNCTION, &[void], ty);
-        let function = self.value(op::FUNCTION, void, &[0, ty]);
-        let label = self.id();
-        self.put(op::LABEL, &[label]);
-        function
-    }
-
-    /// Calls the old entry point.
-    pub(super) fn call(&mut self) {
-        let void = self.void();
-        self.value(op::FUNCTION_CALL, void, &[self.entry.function]);
-    }
-
-    /// Goes on only where `condition` holds. Returns where to meet again.
-    pub(super) fn begin_if(&mut self, condition: u32) -> u32 {
-        let (then, after) = (self.id(), self.id());
-        self.put(op::SELECTION_MERGE, &[after, 0]);
-        self.put(op::BRANCH_CONDITIONAL, &[condition, then, after]);
-        self.put(op::LABEL, &[then]);
-        after
-    }
-
-    pub(super) fn end_if(&mut self, after: u32) {
-        self.put(op::BRANCH, &[after]);
-        self.put(op::LABEL, &[after]);
-    }
-
-    /// The module with `function`, begun before, as its only entry point.
-    pub(super) fn finish(mut self, function: u32) -> Result<Vec<u32>> {
-        self.put(op::RETURN, &[]);
-        self.put(op::FUNCTION_END, &[]);
-        let module = self.module;
-        let operands = module.instructions[self.entry.at].operands();
-        let entry = [&[operands[0], function], &self.entry.name[..], &self.listed].concat();
-        if entry.len() >= 0xffff {
-            return Err("the entry point has too many variables".into());
-        }
-        let declarations = module.declarations();
-        let capabilities = declarations.iter().take_while(|i| i.op() == op::CAPABILITY).count();
-        let annotated =
-            declarations.iter().rposition(|i| precedes_types(i.op())).map_or(0, |n| n + 1);
-
-        let mut words = module.header.to_vec();
-        debug_assert_eq!(words.len(), HEADER);
-        words[3] = self.bound;
-        for (n, i) in module.instructions.iter().enumerate() {
-            if n == capabilities {
-                for capability in &self.capabilities {
-                    words.extend(instruction(op::CAPABILITY, &[*capability]));
-                }
-                for name in &self.extensions {
-                    words.extend(instruction(op::EXTENSION, &string_words(name.as_bytes())));
-                }
-            }
-            if n == annotated {
-                words.extend(&self.decorations);
-            }
-            if n == module.functions {
-                words.extend(&self.globals);
-            }
-            match i.op() {
-                // Other entry points go: one of the same function could not stay, since it is
-                // called now.
-                op::ENTRY_POINT => {
-                    if n == self.entry.at {
-                        words.extend(instruction(op::ENTRY_POINT, &entry));
-                    }
-                }
-                op::EXECUTION_MODE | op::EXECUTION_MODE_ID => {
-                    if i.operand(0) == Ok(self.entry.function) {
-                        words.push(i.words[0]);
-                        words.push(function);
-                        words.extend(&i.words[2..]);
-                    }
-                }
-                op::MEMORY_MODEL if self.addressing.is_some() => {
-                    let addressing = self.addressing.unwrap_or_default();
-                    words.extend(instruction(op::MEMORY_MODEL, &[addressing, i.operand(1)?]));
-                }
-                _ => words.extend(i.words),
-            }
-        }
-        words.extend(&self.function);
-        Ok(words)
-    }
-}
-
-/// Whether an instruction stands before all types: names, decorations, and what stands before them.
-fn precedes_types(op: u32) -> bool {
-    matches!(
-        op,
-        op::CAPABILITY
-            | op::EXTENSION
-            | op::EXT_INST_IMPORT
-            | op::MEMORY_MODEL
-            | op::ENTRY_POINT
-            | op::EXECUTION_MODE
-            | op::EXECUTION_MODE_ID
-            | op::SOURCE_CONTINUED
-            | op::SOURCE
-            | op::SOURCE_EXTENSION
-            | op::NAME
-            | op::MEMBER_NAME
-            | op::STRING
-            | op::MODULE_PROCESSED
-            | op::DECORATE
-            | op::MEMBER_DECORATE
-            | op::DECORATION_GROUP
-            | op::GROUP_DECORATE
-            | op::GROUP_MEMBER_DECORATE
-            | op::DECORATE_ID
-            | op::DECORATE_STRING
-            | op::MEMBER_DECORATE_STRING
-    )
 }

@@ -3,6 +3,7 @@
 use super::colour::Colour;
 use super::declared::Type;
 use super::editor::{BuiltIn, Editor};
+use super::inputs::{Inputs, Written, has_mode, is_per_sample};
 use super::module::{Module, Result};
 use super::record::{Buffers, Record};
 use super::spec::{built_in, capability, class, decoration, memory, mode, model, op};
@@ -41,7 +42,7 @@ pub fn fragment(
     let facts = Facts {
         early_tests: has_mode(&e, mode::EARLY_FRAGMENT_TESTS)
             || has_mode(&e, mode::EARLY_AND_LATE_FRAGMENT_TESTS),
-        per_sample: inputs.sample.is_some(),
+        per_sample: is_per_sample(&e),
         writes_depth: written.depth.is_some(),
         writes_mask: written.mask.is_some(),
         output: colour.output,
@@ -113,94 +114,6 @@ fn refuse(e: &Editor, options: &Options) -> Result<()> {
     Ok(())
 }
 
-fn has_mode(e: &Editor, mode: u32) -> bool {
-    e.module.declarations().iter().any(|i| {
-        i.op() == op::EXECUTION_MODE
-            && i.operand(0) == Ok(e.entry.function)
-            && i.operand(1) == Ok(mode)
-    })
-}
-
-/// Inputs that a record needs.
-struct Inputs {
-    position: BuiltIn,
-    mask: BuiltIn,
-    front: BuiltIn,
-    /// Where the shader is run for each sample: which one.
-    sample: Option<BuiltIn>,
-    primitive: Option<BuiltIn>,
-    instance: Option<BuiltIn>,
-}
-
-impl Inputs {
-    fn declare(e: &mut Editor, options: &Options) -> Self {
-        let per_sample = is_per_sample(e);
-        let (uint, float, bool) = (e.uint(), e.float(), e.bool());
-        let floats = e.vector(float, 4);
-        let position = e.built_in_input(built_in::FRAG_COORD, floats, false);
-        let mask = match e.built_in(class::INPUT, built_in::SAMPLE_MASK) {
-            Some(mask) => mask,
-            None => {
-                let mask = e.array(uint, 1);
-                e.built_in_input(built_in::SAMPLE_MASK, mask, true)
-            }
-        };
-        let front = e.built_in_input(built_in::FRONT_FACING, bool, false);
-        let sample = per_sample.then(|| {
-            e.capability(capability::SAMPLE_RATE_SHADING);
-            e.built_in_input(built_in::SAMPLE_ID, uint, true)
-        });
-        let primitive = options.primitive_id.then(|| {
-            if !e.declared.capabilities.contains(&capability::TESSELLATION) {
-                e.capability(capability::GEOMETRY);
-            }
-            e.built_in_input(built_in::PRIMITIVE_ID, uint, true)
-        });
-        let instance = options.instance.map(|location| {
-            let variable = e.variable(class::INPUT, uint);
-            e.decorate(variable, &[decoration::LOCATION, location]);
-            e.decorate(variable, &[decoration::FLAT]);
-            BuiltIn { variable, member: None, ty: uint }
-        });
-        Self { position, mask, front, sample, primitive, instance }
-    }
-}
-
-/// Whether the shader is run for each sample because of what it reads.
-fn is_per_sample(e: &Editor) -> bool {
-    let used = |built_in: BuiltIn| e.entry.used.contains(&built_in.variable);
-    [built_in::SAMPLE_ID, built_in::SAMPLE_POSITION]
-        .iter()
-        .any(|which| e.built_in(class::INPUT, *which).is_some_and(used))
-        || e.entry.used.iter().any(|id| {
-            e.declared.variables.get(id).is_some_and(|variable| {
-                variable.class == class::INPUT
-                    && (e.declared.decoration(*id, decoration::SAMPLE).is_some()
-                        || e.declared.samples(variable.to))
-            })
-        })
-}
-
-/// Outputs that change what is recorded, where the shader writes them.
-struct Written {
-    depth: Option<BuiltIn>,
-    mask: Option<BuiltIn>,
-}
-
-impl Written {
-    fn find(e: &Editor) -> Self {
-        let written =
-            |which| e.built_in(class::OUTPUT, which).filter(|b| e.entry.used.contains(&b.variable));
-        // After early tests it is too late for another depth.
-        let too_late = has_mode(e, mode::EARLY_FRAGMENT_TESTS)
-            && !has_mode(e, mode::EARLY_AND_LATE_FRAGMENT_TESTS);
-        Self {
-            depth: written(built_in::FRAG_DEPTH).filter(|_| !too_late),
-            mask: written(built_in::SAMPLE_MASK),
-        }
-    }
-}
-
 /// Where a fragment lies.
 struct Position {
     /// `gl_FragCoord`.
@@ -260,7 +173,7 @@ fn coverage(e: &mut Editor, inputs: &Inputs, written: &Written) -> Result<u32> {
     let (uint, one) = (e.uint(), e.constant(1));
     let mut coverage = e.load_integer(class::INPUT, inputs.mask, "gl_SampleMaskIn")?;
     if let Some(sample) = inputs.sample {
-        // The mask has this one sample's bit alone, or should have.
+        // The mask has this one sample's bit alone, or should have: drivers have been wrong here.
         let sample = e.load_integer(class::INPUT, sample, "gl_SampleID")?;
         let bit = e.value(op::SHIFT_LEFT_LOGICAL, uint, &[one, sample]);
         coverage = e.value(op::BITWISE_AND, uint, &[coverage, bit]);

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::declared::{Declared, Entry, Type};
+use super::declared::{Declared, Type};
+use super::entry::Entry;
 use super::module::{Module, Result};
 use super::spec::{class, decoration, model};
 

@@ -6,15 +6,19 @@
 
 #![warn(missing_docs)]
 
+mod code;
 mod colour;
 mod declared;
 mod editor;
+mod entry;
 mod fragment;
+mod inputs;
 mod locations;
 mod module;
 mod record;
 mod spec;
 mod vertex;
+mod write;
 
 pub use fragment::fragment;
 pub use locations::{inputs, outputs};
@@ -51,9 +55,11 @@ pub struct Options {
 /// What is to be known of a fragment shader.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Facts {
-    /// It asks for depth and stencil tests before it is run: what is hidden leaves no record.
+    /// It asks for depth and stencil tests before it is run: what is hidden altogether leaves no
+    /// record. The coverage is from before the tests nevertheless, unless the shader asks for what
+    /// is left of it too.
     pub early_tests: bool,
-    /// It is run for each sample, because of what it reads. (A pipeline can ask for that too.)
+    /// It is run for each sample, because of its inputs. (A pipeline can ask for that too.)
     pub per_sample: bool,
     /// It gives the depth.
     pub writes_depth: bool,
