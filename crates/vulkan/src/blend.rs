@@ -329,14 +329,10 @@ mod tests {
     fn what_a_trace_cannot_say_is_refused() {
         let good = State { mask: 15, ..State::default() };
         assert!(of(&good, UNORM).is_ok());
-        let changes: [(&dyn Fn(&mut State), &str); 3] = [
-            (&|s| s.stencil = true, "stencil"),
-            (&|s| s.logic_op = true, "logic"),
-            (&|s| s.alpha_to_coverage = true, "coverage"),
-        ];
-        for (change, says) in changes {
-            let mut state = good.clone();
-            change(&mut state);
+        let stencil = State { stencil: true, ..good.clone() };
+        let logic = State { logic_op: true, ..good.clone() };
+        let to_coverage = State { alpha_to_coverage: true, ..good };
+        for (state, says) in [(stencil, "stencil"), (logic, "logic"), (to_coverage, "coverage")] {
             assert!(of(&state, UNORM).unwrap_err().contains(says));
         }
         assert_eq!(channels(5), "red and blue");

@@ -7,11 +7,11 @@ use screendoor_trace::error::{Error, Result};
 use screendoor_trace::param::Options;
 use screendoor_trace::picture::Space;
 use screendoor_trace::trace::{
-    ColourFormat, Fragment, Header, SampleMask, SamplePattern, TraceWriter,
+    ColourFormat, DepthPlane, Fragment, Header, SampleMask, SamplePattern, TraceWriter, Unorm32,
 };
 use serde::Serialize;
 
-use crate::background::{Background, background};
+use crate::background::{Background, background, each_pixel, rgb};
 use crate::depth::DepthRule;
 use crate::folder::Captures;
 use crate::format::{PixelFormat, name};
@@ -63,7 +63,7 @@ pub struct Conversion<'a> {
     /// Of the target, as it is drawn into.
     pub(crate) format: PixelFormat,
     format_number: i32,
-    background: Background,
+    background: Background<'a>,
     depth: DepthRule,
 }
 
@@ -238,10 +238,7 @@ impl<'a> Conversion<'a> {
         let chosen = &self.chosen;
         let plan = Plan::new(chosen, self.depth == DepthRule::Order);
         let mut push = |fragment: &Fragment| writer.push(fragment);
-        if let Background::Picture(pixels) = &self.background {
-            self.paint(pixels, &mut push)?;
-        }
-        let is_painted = matches!(self.background, Background::Picture(_));
+        let is_painted = self.paint(&mut push)?;
         let mut making = Making::new(self, &plan, self.depth, is_painted);
         let draws = plan.acts.iter().enumerate().filter_map(|(i, act)| match act {
             Act::Draw(planned) => Some((i as u32, planned)),
@@ -286,29 +283,19 @@ impl<'a> Conversion<'a> {
         Ok(converted)
     }
 
-    /// Hands on what was there before the first draw: opaque, as far away as can be.
-    fn paint(
-        &self,
-        pixels: &[[f32; 3]],
-        push: &mut dyn FnMut(&Fragment) -> Result<()>,
-    ) -> Result<()> {
+    /// Hands on what was there before the first draw, where that is no single colour: opaque, as
+    /// far away as can be.
+    fn paint(&self, push: &mut dyn FnMut(&Fragment) -> Result<()>) -> Result<bool> {
+        let Background::Picture(picture) = self.background else { return Ok(false) };
+        let Chosen { capture, place, .. } = self.chosen;
         let coverage = SampleMask::first(self.header.pattern.samples());
-        for (i, colour) in pixels.iter().enumerate() {
-            let (x, y) = (i as u32 % self.header.width, i as u32 / self.header.width);
-            push(&Fragment {
-                x: x as u16,
-                y: y as u16,
-                coverage,
-                depth: screendoor_trace::trace::DepthPlane {
-                    z: screendoor_trace::trace::Unorm32::FAR,
-                    ..Default::default()
-                },
-                colour: *colour,
-                alpha: 1.0,
-                ..Fragment::default()
-            })?;
-        }
-        Ok(())
+        let depth = DepthPlane { z: Unorm32::FAR, dzdx: 0, dzdy: 0 };
+        each_pixel(capture, picture, &self.format, place, &mut |[x, y], colour| {
+            let colour = rgb(colour);
+            let alpha = 1.0;
+            push(&Fragment { x, y, coverage, depth, colour, alpha, ..Fragment::default() })
+        })?;
+        Ok(true)
     }
 
     /// What depths are, by its name.

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use ash::vk;
-use screendoor_trace::tile::{TILE_PIXELS, TileGrid, TileMap};
 use screendoor_trace::trace::{DepthPlane, Unorm32};
 use screendoor_vulkan_layer::log::{Record, State};
 
 use crate::format::stored_depth;
+use crate::samples::{Area, Samples};
 use crate::target::Place;
 
 screendoor_trace::options! {
@@ -19,16 +19,6 @@ screendoor_trace::options! {
         Program = "program": "the program's own",
         Order = "order": "the order of drawing, of what passes the program's own tests",
     }
-}
-
-/// A rectangle of pixels: left, upper, width, height.
-pub(crate) type Area = [i32; 4];
-
-/// Whether an area holds a whole frame of a size.
-pub(crate) fn covers(area: Area, size: [u32; 2]) -> bool {
-    let [left, upper, width, height] = area.map(i64::from);
-    let [right, lower] = [left + width, upper + height];
-    left <= 0 && upper <= 0 && right >= size[0].into() && lower >= size[1].into()
 }
 
 /// Whether an operation lets pass what is further away than what is there.
@@ -50,58 +40,18 @@ fn at(record: &Record, [x, y]: [i8; 2]) -> f32 {
 pub(crate) struct DepthImage {
     format: i32,
     positions: Vec<[i8; 2]>,
-    cleared: f32,
-    /// Parts that were cleared since, and to what.
-    parts: Vec<(Area, f32)>,
-    tiles: TileMap<Tile>,
-}
-
-struct Tile {
-    /// How many of the parts it has heard of.
-    heard: usize,
-    /// Of each pixel its samples.
-    depths: Box<[f32]>,
+    held: Samples<f32>,
 }
 
 impl DepthImage {
     pub(crate) fn new(size: [u32; 2], format: i32, positions: &[[i8; 2]], cleared: f32) -> Self {
-        let tiles = TileMap::new(TileGrid::new(size[0], size[1]));
-        DepthImage { format, positions: positions.to_vec(), cleared, parts: Vec::new(), tiles }
+        let held = Samples::new(size, positions.len(), Box::new(move |_, _| cleared));
+        DepthImage { format, positions: positions.to_vec(), held }
     }
 
-    /// Clears an area; it costs nothing where nothing is drawn.
+    /// Clears an area.
     pub(crate) fn clear(&mut self, area: Area, value: f32) {
-        let grid = self.tiles.grid();
-        if covers(area, [grid.width(), grid.height()]) {
-            self.parts.clear();
-            self.cleared = value;
-            self.tiles = TileMap::new(grid);
-        } else {
-            self.parts.push((area, value));
-        }
-    }
-
-    fn samples(&mut self, x: u16, y: u16) -> &mut [f32] {
-        let (count, cleared) = (self.positions.len(), self.cleared);
-        let grid = self.tiles.grid();
-        let id = grid.tile(x, y);
-        let tile = self.tiles.get_or_insert_with(id, || Tile {
-            heard: 0,
-            depths: vec![cleared; TILE_PIXELS * count].into(),
-        });
-        for (area, value) in &self.parts[tile.heard..] {
-            let [left, upper, width, height] = area.map(i64::from);
-            for (within, depths) in tile.depths.chunks_exact_mut(count).enumerate() {
-                let (x, y) = grid.pixel(id, within);
-                let inside = |at: u32, low: i64, side: i64| (low..low + side).contains(&at.into());
-                if inside(x, left, width) && inside(y, upper, height) {
-                    depths.fill(*value);
-                }
-            }
-        }
-        tile.heard = self.parts.len();
-        let from = TileGrid::within(x, y) * count;
-        &mut tile.depths[from..from + count]
+        self.held.clear(area, stored_depth(self.format, value));
     }
 
     /// Of the samples of `coverage` those that pass the test of `state`; their depths are written
@@ -126,7 +76,7 @@ impl DepthImage {
         let depths: Vec<f32> =
             self.positions.iter().map(|p| stored_depth(self.format, at(record, *p))).collect();
         let [x, y] = [record.x(), record.y()].map(|v| v as u16);
-        let held = self.samples(x, y);
+        let held = self.held.at(x, y);
         let mut passed = 0;
         for (s, (held, depth)) in held.iter_mut().zip(depths).enumerate() {
             let passes = match op {
@@ -213,28 +163,5 @@ mod tests {
         // Equal stands for what is nearest.
         let equal = test(vk::CompareOp::EQUAL, false);
         assert_eq!(image.test(&record(0.9, [0.0; 2]), 3, &equal, false), 1);
-    }
-
-    #[test]
-    fn parts_that_are_cleared_cost_nothing_before_they_are_drawn_in() {
-        let format = vk::Format::D32_SFLOAT.as_raw();
-        let mut image = DepthImage::new([65536, 65536], format, &[[0, 0]], 0.5);
-        let less = test(vk::CompareOp::LESS, true);
-        let far = |x: u32| Record { place: x, ..record(0.6, [0.0; 2]) };
-        assert_eq!(image.test(&far(3), 1, &less, false), 0);
-        image.clear([0, 0, 5, 65536], 1.0);
-        assert_eq!(image.test(&far(3), 1, &less, false), 1);
-        assert_eq!(image.test(&far(3), 1, &less, false), 0, "once");
-        assert_eq!(image.test(&far(5), 1, &less, false), 0, "beside it");
-        image.clear([0, 0, 65536, 65536], 1.0);
-        assert_eq!(image.test(&far(5), 1, &less, false), 1);
-        assert!(image.parts.is_empty());
-    }
-
-    #[test]
-    fn areas_that_hold_a_frame() {
-        assert!(covers([0, 0, 4, 5], [4, 5]) && covers([-1, 0, 9, 9], [4, 5]));
-        assert!(!covers([1, 0, 9, 9], [4, 5]) && !covers([0, 0, 4, 4], [4, 5]));
-        assert!(covers([0, 0, i32::MAX, i32::MAX], [65536, 65536]));
     }
 }

@@ -74,6 +74,12 @@ impl Captures {
         self.devices.is_empty()
     }
 
+    /// As it is where the program was ended early: what it never presents is not whole.
+    pub fn broken_off(mut self) -> Self {
+        self.devices.iter_mut().for_each(|device| device.is_torn = true);
+        self
+    }
+
     /// Frames that the program presented, on the device that presented most.
     pub fn frames(&self) -> u64 {
         let last = |d: &DeviceCapture| d.presents.iter().map(|p| p.frame + 1).max().unwrap_or(0);

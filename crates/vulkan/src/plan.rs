@@ -7,8 +7,9 @@ use ash::vk;
 use screendoor_vulkan_layer::log::{Attachment, Clear, Draw, Event, Pass};
 
 use crate::blend::{self, Rule};
-use crate::depth::{Area, covers, is_reversed};
+use crate::depth::is_reversed;
 use crate::frame::Step;
+use crate::samples::{Area, covers};
 use crate::target::{Chosen, Place};
 
 /// What is there before the first draw.
@@ -293,7 +294,7 @@ impl<'a> Plan<'a> {
 }
 
 /// The depth images that draws into the chosen place are tested against.
-fn shared(chosen: &Chosen<'_>) -> BTreeSet<Place> {
+pub(crate) fn shared(chosen: &Chosen<'_>) -> BTreeSet<Place> {
     let mut shared = BTreeSet::new();
     for step in chosen.frame.steps(chosen.capture) {
         if let (Some(pass), Event::Draw(draw)) = (step.pass, step.what)
