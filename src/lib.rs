@@ -47,6 +47,7 @@ pub use screendoor_rop::resolve;
 pub use screendoor_scene::{capture, scene};
 pub use screendoor_study::{metrics, study};
 pub use screendoor_trace::{edit, error, options, output, param, picture, random, tile, trace};
+pub use screendoor_vulkan as vulkan;
 
 /// The worked example of `docs/ADD_A_DESIGN.md`, compiled and run as a test.
 #[cfg(doctest)]

@@ -1,8 +1,10 @@
 //! Arguments that several commands share, and how they are read.
 
 use std::ffi::OsStr;
+use std::fmt::Display;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 use clap::builder::{PossibleValue, StringValueParser, TypedValueParser};
 use clap::{Arg, Args, Command};
@@ -95,6 +97,18 @@ pub(super) fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     numbers
         .and_then(|n| n.try_into().ok())
         .ok_or_else(|| format!("'{text}' is not {N} numbers separated by commas"))
+}
+
+/// Reads `A-B`, both included, or `A` alone.
+pub(super) fn range<T: FromStr + PartialOrd + Clone + Display>(
+    text: &str,
+) -> Result<RangeInclusive<T>, String> {
+    let (first, last) = text.split_once('-').unwrap_or((text, text));
+    let number = |text: &str| text.trim().parse::<T>().ok();
+    let ends = number(first).zip(number(last)).filter(|(first, last)| first <= last);
+    let (first, last) =
+        ends.ok_or_else(|| format!("'{text}' is no range of numbers; write it as 10-19"))?;
+    Ok(first..=last)
 }
 
 /// `count` seeds from `first` on.
@@ -194,6 +208,15 @@ mod tests {
         let labels: Vec<String> = list.iter().map(Configured::label).collect();
         assert_eq!(labels, ["lk", "slab:layers=4,bits=8", "enderton:mask=naive"]);
         assert!(design_list("lk,nothing").is_err());
+    }
+
+    #[test]
+    fn ranges() {
+        assert_eq!(range::<u32>("10-19"), Ok(10..=19));
+        assert_eq!(range::<u64>("7"), Ok(7..=7));
+        for bad in ["", "-", "9-8", "-1", "1-", "a-b", "0-4294967296"] {
+            assert!(range::<u32>(bad).is_err(), "{bad}");
+        }
     }
 
     #[test]

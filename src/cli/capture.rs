@@ -1,6 +1,6 @@
 //! `screendoor capture`.
 
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -15,6 +15,7 @@ use crate::cli::console::{Console, grouped, shown, table};
 use crate::cli::files::{JsonArgument, check, check_scene, report};
 use crate::cli::kind::{Kind, check_output};
 use crate::cli::signals::on_interrupt;
+use crate::cli::vulkan::{self, VulkanArguments};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::capture::{CrossCheck, GpuCapture};
@@ -25,17 +26,77 @@ use crate::trace::{
     ColourFormat, ColumnId, Compression, Header, Scalar, TraceWriter, WriteOptions, Written,
 };
 
-/// Draw a scene and record its fragments as a trace
+/// Draw a scene and record its fragments as a trace; or record those of another program
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    #[arg(help = format!(
+    #[command(flatten)]
+    scene: SceneArguments,
+    #[command(flatten)]
+    pub common: CommonArguments,
+    #[command(flatten, next_help_heading = "Another program's fragments, by a layer of Vulkan")]
+    vulkan: VulkanArguments,
+}
+
+/// What a trace is made into, whatever it is of.
+#[derive(Debug, Args)]
+pub(super) struct CommonArguments {
+    /// The trace to write
+    #[arg(long, short, value_name = "TRACE", required_unless_present = "list")]
+    pub output: Option<PathBuf>,
+    /// Write nothing where there is anything to warn of
+    #[arg(long)]
+    pub strict: bool,
+    /// What colours stand for, and so in what designs blend them: 'encoded' for splats, which
+    /// are trained so, and else 'linear', where not given; with --vulkan, what the target's
+    /// format says
+    #[arg(long, value_parser = option::<Space>())]
+    pub space: Option<Space>,
+    /// Linear colour behind all, each channel 0 to 65504
+    #[arg(long, value_name = "R,G,B", value_parser = colour, allow_hyphen_values = true)]
+    pub background: Option<[f64; 3]>,
+    /// Keep colours in single precision, not in half
+    #[arg(long)]
+    pub float_colour: bool,
+    /// How the trace's columns are stored
+    #[arg(long, default_value = "none", value_parser = option::<Compression>())]
+    pub compress: Compression,
+    /// With --gpu, draw with our own rasteriser too, and print where the two differ; with --vulkan,
+    /// blend what was recorded as the program does, and print how far that is from its picture
+    #[arg(long, requires = "held_against")]
+    pub check: bool,
+    #[command(flatten)]
+    pub json: JsonArgument,
+}
+
+impl CommonArguments {
+    /// Precision of colours.
+    pub fn colour(&self) -> ColourFormat {
+        if self.float_colour { ColourFormat::F32 } else { ColourFormat::F16 }
+    }
+
+    /// Where the trace goes. Clap has seen to it that it is given.
+    pub fn output(&self) -> Result<&Path> {
+        let none = || Error::config("it is not said where the trace goes", "name it with -o");
+        let output = self.output.as_deref().ok_or_else(none)?;
+        if output == Path::new("-") {
+            return Err(Error::config(
+                "a trace cannot go to standard output",
+                "name a file (./- for one that is called so)",
+            ));
+        }
+        check_output(output, Kind::Trace)?;
+        Ok(output)
+    }
+}
+
+/// What is drawn, and how.
+#[derive(Debug, Args)]
+struct SceneArguments {
+    #[arg(required_unless_present = "vulkan", help = format!(
         "A scene's file ({}), or builtin:NAME[:parameter=value,…] ('screendoor scenes' lists them)",
         scene::endings()
     ))]
-    scene: OsString,
-    /// The trace to write
-    #[arg(long, short, value_name = "TRACE")]
-    output: PathBuf,
+    scene: Option<OsString>,
     /// Frame size in pixels: that of --camera, or 800x800, where not given
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<(u32, u32)>,
@@ -56,9 +117,6 @@ pub(super) struct Arguments {
     /// Which grid of a .vdb file to draw: 'density' or the first fog volume where not given
     #[arg(long, value_name = "NAME")]
     grid: Option<String>,
-    /// Write nothing where there is anything to warn of
-    #[arg(long)]
-    strict: bool,
     /// Make every surface white, keeping alphas
     #[arg(long)]
     white: bool,
@@ -102,30 +160,12 @@ pub(super) struct Arguments {
     /// beside surfaces are left out, and others are as wide as suits their extent
     #[arg(long, value_name = "WIDTH", allow_negative_numbers = true)]
     line_width: Option<f64>,
-    /// What colours stand for, and so in what designs blend them: 'encoded' for splats, which
-    /// are trained so, and else 'linear', where not given
-    #[arg(long, value_parser = option::<Space>())]
-    space: Option<Space>,
-    /// Linear colour behind the scene, each channel 0 to 65504
-    #[arg(long, value_name = "R,G,B", value_parser = colour, allow_hyphen_values = true)]
-    background: Option<[f64; 3]>,
-    /// Keep colours in single precision, not in half
-    #[arg(long)]
-    float_colour: bool,
-    /// How the trace's columns are stored
-    #[arg(long, default_value = "none", value_parser = option::<Compression>())]
-    compress: Compression,
     /// Have a GPU find which samples are covered, at its own 4 samples a pixel
-    #[arg(long)]
+    #[arg(long, group = "held_against")]
     gpu: bool,
     /// Which GPU: a part of its name or its driver's
     #[arg(long, value_name = "NAME", requires = "gpu")]
     adapter: Option<String>,
-    /// Draw with our own rasteriser too, and print where the two differ
-    #[arg(long, requires = "gpu")]
-    check: bool,
-    #[command(flatten)]
-    json: JsonArgument,
 }
 
 #[derive(Serialize)]
@@ -148,13 +188,20 @@ struct Document<'a> {
 const DEFAULT_SIZE: [u32; 2] = [800, 800];
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
-    let (source, path) = arguments::scene(&arguments.scene)?;
-    if arguments.output == Path::new("-") {
-        return Err(Error::config(
-            "a trace cannot go to standard output",
-            "name a file (./- for one that is called so)",
-        ));
+    match &arguments.scene.scene {
+        Some(scene) => run_scene(scene, &arguments.scene, &arguments.common, console),
+        None => vulkan::run(&arguments.vulkan, &arguments.common, console),
     }
+}
+
+fn run_scene(
+    scene: &OsStr,
+    arguments: &SceneArguments,
+    common: &CommonArguments,
+    console: &Console,
+) -> Result<()> {
+    let (source, path) = arguments::scene(scene)?;
+    let output = common.output()?;
     // A misspelt name and a machine without a GPU are told before anything is done.
     scene::check(source)?;
     let splats = SplatRules::parse(&arguments.splat_rules)?;
@@ -172,12 +219,10 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let gpu = arguments.gpu.then(|| Gpu::open(arguments.adapter.as_deref())).transpose()?;
     let inputs: Vec<&Path> =
         path.into_iter().chain(arguments.texture.as_deref()).chain(choice.file()).collect();
-    let outputs: Vec<&Path> =
-        [&*arguments.output].into_iter().chain(arguments.json.path()).collect();
+    let outputs: Vec<&Path> = [output].into_iter().chain(common.json.path()).collect();
     check(&inputs, &outputs)?;
-    check_output(&arguments.output, Kind::Trace)?;
-    let file = OutputFile::create(&arguments.output)?;
-    let json = arguments.json.open()?;
+    let file = OutputFile::create(output)?;
+    let json = common.json.open()?;
     let loading = console.progress("loading the scene", "");
     let load = LoadOptions {
         grid: arguments.grid.clone(),
@@ -214,8 +259,8 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         order: arguments.order,
         order_seed: arguments.order_seed,
         faces: arguments.faces,
-        colour: if arguments.float_colour { ColourFormat::F32 } else { ColourFormat::F16 },
-        background: arguments.background.map(|b| b.map(|c| c as f32)),
+        colour: common.colour(),
+        background: common.background.map(|b| b.map(|c| c as f32)),
         camera: CameraOptions {
             angle: arguments.angle,
             distance: arguments.distance,
@@ -223,22 +268,22 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
             pose: chosen.pose,
         },
         splats,
-        space: arguments.space,
+        space: common.space,
     };
     scene.warnings.extend(options.unused(&scene));
-    let write = WriteOptions { compression: arguments.compress, ..WriteOptions::default() };
-    let reporting = Reporting { scene: &scene, unseen: true, strict: arguments.strict };
+    let write = WriteOptions { compression: common.compress, ..WriteOptions::default() };
+    let reporting = Reporting { scene: &scene, unseen: true, strict: common.strict };
     let ((written, unseen), differences) = match &gpu {
         None => (reporting.record(&Capture::new(&scene, &options)?, write, file, console)?, None),
         Some(gpu) => {
             let capture = GpuCapture::new(gpu, &scene, &options)?;
             let recorded = reporting.record(&capture, write, file, console)?;
-            let found = arguments.check.then(|| cross_check(&capture, console)).transpose()?;
+            let found = common.check.then(|| cross_check(&capture, console)).transpose()?;
             (recorded, found)
         }
     };
     let document = Document {
-        trace: arguments.output.display().to_string(),
+        trace: output.display().to_string(),
         scene: &scene.source,
         width,
         height,
@@ -340,7 +385,7 @@ impl Reporting<'_> {
         console: &Console,
     ) -> Result<Recorded> {
         let header = capture.header();
-        self.warn(&self.scene.warnings, console)?;
+        console.warn_all(&self.scene.warnings, self.strict, &self.scene.source)?;
         let place = file.path().display().to_string();
         let mut writer = TraceWriter::new(file, &place, header.clone(), options)?;
         let progress = console.progress("capturing", "primitives");
@@ -359,25 +404,10 @@ impl Reporting<'_> {
         if written.rows == 0 {
             warnings.push(format!("the trace has no fragments: {}", why_empty(header)));
         }
-        self.warn(&warnings, console)?;
+        console.warn_all(&warnings, self.strict, &self.scene.source)?;
         file.commit()?;
         on_interrupt(move || format!("{place} is whole and kept"));
         Ok((written, unseen))
-    }
-
-    /// Tells warnings.
-    ///
-    /// # Errors
-    /// [`Error::Unsupported`] where there are any and none may be.
-    fn warn(&self, warnings: &[String], console: &Console) -> Result<()> {
-        warnings.iter().for_each(|warning| console.warn(warning));
-        let Some(first) = warnings.first().filter(|_| self.strict) else { return Ok(()) };
-        let what = match warnings.len() {
-            1 => format!("there is a warning, and none may be ({first})"),
-            n => format!("there are {n} warnings, and none may be (the first: {first})"),
-        };
-        let hint = "nothing is written: mend the scene, or leave --strict out";
-        Err(Error::unsupported(&self.scene.source, what, hint))
     }
 }
 

@@ -72,6 +72,21 @@ impl Console {
         }
     }
 
+    /// Prints warnings about `source`.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] where there are any, and with `strict` none may be.
+    pub fn warn_all(&self, warnings: &[String], strict: bool, source: &str) -> Result<()> {
+        warnings.iter().for_each(|warning| self.warn(warning));
+        let Some(first) = warnings.first().filter(|_| strict) else { return Ok(()) };
+        let what = match warnings.len() {
+            1 => format!("there is a warning, and none may be ({first})"),
+            n => format!("there are {n} warnings, and none may be (the first: {first})"),
+        };
+        let hint = "nothing is written: mend the scene, or leave --strict out";
+        Err(Error::unsupported(source, what, hint))
+    }
+
     /// Tells what is to be known beforehand, to standard error.
     pub fn note(&self, text: Arguments<'_>) {
         if !self.quiet {

@@ -1,14 +1,12 @@
 //! `screendoor convert`, `trim`, `join` and `shuffle`: traces made of traces.
 
-use std::fmt::Display;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 
 use clap::Args;
 use serde::Serialize;
 
-use crate::cli::arguments::{option, samples, size};
+use crate::cli::arguments::{option, range, samples, size};
 use crate::cli::console::{Console, grouped, shown};
 use crate::cli::files::{Json, JsonArgument, check, open_trace, report};
 use crate::cli::kind::{Kind, check_output};
@@ -283,29 +281,12 @@ fn area(text: &str) -> Result<Area, String> {
     Ok(Area { origin: origin.into(), size: [width, height] })
 }
 
-/// Reads `A-B`, both included, or `A` alone.
-fn range<T: FromStr + PartialOrd + Clone + Display>(
-    text: &str,
-) -> Result<RangeInclusive<T>, String> {
-    let (first, last) = text.split_once('-').unwrap_or((text, text));
-    let number = |text: &str| text.trim().parse::<T>().ok();
-    let ends = number(first).zip(number(last)).filter(|(first, last)| first <= last);
-    let (first, last) =
-        ends.ok_or_else(|| format!("'{text}' is no range of numbers; write it as 10-19"))?;
-    Ok(first..=last)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn ranges_and_rectangles() {
-        assert_eq!(range::<u32>("10-19"), Ok(10..=19));
-        assert_eq!(range::<u64>("7"), Ok(7..=7));
-        for bad in ["", "-", "9-8", "-1", "1-", "a-b", "0-4294967296"] {
-            assert!(range::<u32>(bad).is_err(), "{bad}");
-        }
+    fn rectangles() {
         let expected = Area { origin: [3, 4], size: [50, 60] };
         assert_eq!(area("3, 4,50x60"), Ok(expected));
         for bad in ["", "3,4", "3,4,50", "3,50x60", "-1,0,5x5", "0,0,0x5", "1,2,3x4,5"] {

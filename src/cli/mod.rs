@@ -22,6 +22,7 @@ mod stress;
 mod study;
 mod throughput;
 mod verify;
+mod vulkan;
 
 use std::io::{self, Write as _};
 use std::process::ExitCode;

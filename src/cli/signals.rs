@@ -3,7 +3,8 @@
 #[cfg(unix)]
 use std::io::{self, IsTerminal as _, Write as _};
 #[cfg(unix)]
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 type Say = Box<dyn Fn() -> String + Send>;
@@ -15,6 +16,16 @@ static KEPT: Mutex<Option<Say>> = Mutex::new(None);
 /// so, nothing was written.
 pub(super) fn on_interrupt(kept: impl Fn() -> String + Send + 'static) {
     *KEPT.lock().unwrap_or_else(PoisonError::into_inner) = Some(Box::new(kept));
+}
+
+/// The process of a program that runs under ours, 0 where there is none.
+static PROGRAM: AtomicU32 = AtomicU32::new(0);
+
+/// Says that a program's process runs under ours, or that none does. An interruption from the
+/// keyboard is the program's then, once: what it has left is what we are there for. Where we are
+/// ended, it is told to end.
+pub(super) fn runs_under_us(process: Option<u32>) {
+    PROGRAM.store(process.unwrap_or(0), Ordering::SeqCst);
 }
 
 /// What is said of the end.
@@ -37,7 +48,15 @@ pub(super) fn clean_up(quiet: bool) {
     // Without a handler, files stay behind, and nothing else is lost.
     let Ok(mut signals) = Signals::new(heeded.chain([SIGUSR2])) else { return };
     let watch = move || {
+        let mut passed_on = false;
         for signal in signals.forever() {
+            let program = PROGRAM.load(Ordering::SeqCst);
+            if program != 0 && signal == SIGINT && !std::mem::replace(&mut passed_on, true) {
+                continue;
+            }
+            if program != 0 {
+                crate::vulkan::terminate(program);
+            }
             crate::output::abandon_all();
             if HAS_FAILED.load(Ordering::SeqCst) {
                 eprintln!(

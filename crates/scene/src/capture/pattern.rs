@@ -28,31 +28,6 @@ screendoor_trace::options! {
     }
 }
 
-const STANDARD: [&[[i8; 2]]; 5] = [
-    &[[0, 0]],
-    &[[4, 4], [-4, -4]],
-    &[[-2, -6], [6, -2], [-6, 2], [2, 6]],
-    &[[1, -3], [-1, 3], [5, 1], [-3, -5], [-5, 5], [-7, -1], [3, 7], [7, -7]],
-    &[
-        [1, 1],
-        [-1, -3],
-        [-3, 2],
-        [4, -1],
-        [-5, -2],
-        [2, 5],
-        [5, 3],
-        [3, -5],
-        [-2, 6],
-        [0, -7],
-        [-4, -6],
-        [-6, 4],
-        [-8, 0],
-        [7, -4],
-        [6, 7],
-        [-7, -8],
-    ],
-];
-
 /// The flips of the best scrambling, the same in both dimensions: bit `i − 1` says
 /// whether node `i` of the binary tree over four digits (numbered as in a heap)
 /// flips the digit below it.
@@ -103,29 +78,24 @@ pub fn pattern(kind: PatternKind, samples: u32) -> Result<SamplePattern> {
             "samples are 1, 2, 4, 8, 16, 32 or 64",
         ));
     }
-    let is_nested = match kind {
-        PatternKind::Centre => {
+    let standard = SamplePattern::standard(samples);
+    match (kind, standard) {
+        (PatternKind::Centre, _) => {
             let positions = vec![[0, 0]; samples as usize];
             let name = format!("centre-{samples}");
-            return Ok(SamplePattern { name, positions, nested: true });
+            Ok(SamplePattern { name, positions, nested: true })
         }
-        PatternKind::Auto => samples > 16,
-        PatternKind::Standard if samples > 16 => {
-            return Err(Error::config(
-                format_args!("there is no standard pattern of {samples} samples"),
-                "ask for at most 16, or for the pattern 'nested'",
-            ));
-        }
-        PatternKind::Standard => false,
-        PatternKind::Nested => true,
-    };
-    let positions = if is_nested {
-        nested(samples, FLIPS)
-    } else {
-        STANDARD[samples.trailing_zeros() as usize].to_vec()
-    };
-    let name = if is_nested { "nested" } else { "standard" };
-    Ok(SamplePattern { name: format!("{name}-{samples}"), positions, nested: is_nested })
+        (PatternKind::Auto | PatternKind::Standard, Some(standard)) => Ok(standard),
+        (PatternKind::Standard, None) => Err(Error::config(
+            format_args!("there is no standard pattern of {samples} samples"),
+            "ask for at most 16, or for the pattern 'nested'",
+        )),
+        (PatternKind::Auto | PatternKind::Nested, _) => Ok(SamplePattern {
+            name: format!("nested-{samples}"),
+            positions: nested(samples, FLIPS),
+            nested: true,
+        }),
+    }
 }
 
 #[cfg(test)]
@@ -211,8 +181,9 @@ mod tests {
         // The standard patterns beside them: at 2 samples the nested one pays for
         // having the first at the centre, from 4 on they are alike.
         let standard = [0.75, 0.4375, 0.296875, 0.18359375, 0.1640625];
-        for (positions, expected) in STANDARD.iter().zip(standard) {
-            assert_eq!(star_discrepancy(positions), expected, "{}", positions.len());
+        for (k, expected) in standard.into_iter().enumerate() {
+            let pattern = SamplePattern::standard(1 << k).unwrap();
+            assert_eq!(star_discrepancy(&pattern.positions), expected, "{k}");
         }
     }
 

@@ -1,5 +1,6 @@
 //! Output files that appear whole or not at all.
 
+mod folder;
 mod partial;
 mod place;
 
@@ -7,6 +8,7 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 
+pub use folder::TemporaryFolder;
 pub use partial::{abandon_all, is_partial};
 pub use place::same_file;
 

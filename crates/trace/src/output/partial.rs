@@ -35,7 +35,7 @@ pub fn abandon_all() {
     let known = known();
     for path in known.iter() {
         // What cannot be removed stays: there is nobody left to tell.
-        let _ = fs::remove_file(path);
+        let _ = if path.is_dir() { remove_folder(path) } else { fs::remove_file(path) };
     }
     // Never unlocked, so that no other file appears.
     std::mem::forget(known);
@@ -49,6 +49,17 @@ pub(super) enum Partial {
     Unnamed,
     /// A temporary one; `None` once it is renamed.
     Named(Option<TempPath>),
+    /// It is a folder.
+    Folder(PathBuf),
+}
+
+/// The file in a folder under construction whose lock says that its process lives.
+const LOCK: &str = "lock";
+
+/// Removes a folder with all that is in it. Others may still write there.
+fn remove_folder(path: &Path) -> io::Result<()> {
+    let removed = || fs::remove_dir_all(path);
+    removed().or_else(|_| removed()).or_else(|_| removed())
 }
 
 fn builder<'a>() -> tempfile::Builder<'a, 'static> {
@@ -81,9 +92,24 @@ impl Partial {
         Ok((file, Partial::Named(Some(path))))
     }
 
+    /// Makes a folder in `within`: its path, and the file whose lock says that it is in use.
+    pub(super) fn folder(within: &Path) -> io::Result<(PathBuf, File, Partial)> {
+        sweep_once(within);
+        let mut known = known();
+        let path = builder().tempdir_in(within).map(tempfile::TempDir::keep)?;
+        known.push(path.clone());
+        let partial = Partial::Folder(path.clone());
+        drop(known);
+        let lock = File::create(path.join(LOCK))?;
+        let _ = lock.try_lock();
+        Ok((path, lock, partial))
+    }
+
     /// Gives the finished `file` its name `destination`, in the folder that it was begun in.
     pub(super) fn persist(mut self, file: &File, destination: &Path) -> io::Result<()> {
         match &mut self {
+            // It has its name, and is not kept.
+            Partial::Folder(_) => Ok(()),
             #[cfg(target_os = "linux")]
             Partial::Unnamed => {
                 // A process that was told to end gives no more names.
@@ -111,12 +137,22 @@ impl Partial {
 
 impl Drop for Partial {
     fn drop(&mut self) {
-        if let Partial::Named(path) = self
-            && let Some(path) = path.take()
-        {
-            let mut known = known();
-            known.retain(|p| *p != *path);
-            drop(path);
+        match self {
+            #[cfg(target_os = "linux")]
+            Partial::Unnamed => {}
+            Partial::Named(path) => {
+                if let Some(path) = path.take() {
+                    let mut known = known();
+                    known.retain(|p| *p != *path);
+                    drop(path);
+                }
+            }
+            Partial::Folder(path) => {
+                let mut known = known();
+                known.retain(|p| p != path);
+                // What cannot be removed is in nobody's way.
+                let _ = remove_folder(path);
+            }
         }
     }
 }
@@ -177,13 +213,16 @@ fn sweep(folder: &Path, grace: Duration) {
             continue;
         }
         // No pipe of that name, at which opening would wait.
-        let Some(metadata) = entry.metadata().ok().filter(|m| m.is_file()) else { continue };
+        let Some(metadata) = entry.metadata().ok().filter(|m| m.is_file() || m.is_dir()) else {
+            continue;
+        };
         let age = metadata.modified().ok().and_then(|t| t.elapsed().ok());
         let is_old = age.is_some_and(|age| age >= grace);
+        let lock = if metadata.is_dir() { path.join(LOCK) } else { path.clone() };
         // Who writes it holds its lock.
-        if is_old && File::open(&path).is_ok_and(|file| file.try_lock().is_ok()) {
+        if is_old && File::open(lock).is_ok_and(|file| file.try_lock().is_ok()) {
             // What cannot be removed is in nobody's way.
-            let _ = fs::remove_file(&path);
+            let _ = if metadata.is_dir() { remove_folder(&path) } else { fs::remove_file(&path) };
         }
     }
 }
@@ -243,11 +282,15 @@ mod tests {
         let other = folder.path().join(".screendoor-notes.txt");
         fs::write(&dead, b"half").unwrap();
         fs::write(&other, b"mine").unwrap();
+        let emptied = folder.path().join(".screendoor-emptied.partial");
+        fs::create_dir(&emptied).unwrap();
+        fs::write(emptied.join(LOCK), b"").unwrap();
         let (_file, partial) = Partial::named(folder.path()).unwrap();
+        let (living, _lock, _partial) = Partial::folder(folder.path()).unwrap();
         sweep(folder.path(), Duration::from_secs(3600));
-        assert!(dead.exists(), "it may just have been made");
+        assert!(dead.exists() && emptied.exists(), "they may just have been made");
         sweep(folder.path(), Duration::ZERO);
-        assert!(!dead.exists() && other.exists());
+        assert!(!dead.exists() && !emptied.exists() && other.exists() && living.exists());
         let Partial::Named(Some(path)) = &partial else { panic!("it has a name") };
         assert!(path.exists());
     }

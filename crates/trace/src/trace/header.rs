@@ -21,6 +21,32 @@ pub(super) const WITH_VIEW: &str = "1.1";
 /// The version of traces without a view, which are as they were before there was any.
 const WITHOUT_VIEW: &str = "1.0";
 
+/// The standard patterns of Direct3D and Vulkan of 1, 2, 4, 8 and 16 samples.
+const STANDARD: [&[[i8; 2]]; 5] = [
+    &[[0, 0]],
+    &[[4, 4], [-4, -4]],
+    &[[-2, -6], [6, -2], [-6, 2], [2, 6]],
+    &[[1, -3], [-1, 3], [5, 1], [-3, -5], [-5, 5], [-7, -1], [3, 7], [7, -7]],
+    &[
+        [1, 1],
+        [-1, -3],
+        [-3, 2],
+        [4, -1],
+        [-5, -2],
+        [2, 5],
+        [5, 3],
+        [3, -5],
+        [-2, 6],
+        [0, -7],
+        [-4, -6],
+        [-6, 4],
+        [-8, 0],
+        [7, -4],
+        [6, 7],
+        [-7, -8],
+    ],
+];
+
 /// The longest side of a frame, in pixels: coordinates are 16 bits.
 pub const MAX_SIDE: u32 = 1 << 16;
 
@@ -41,6 +67,12 @@ impl SamplePattern {
     /// How many samples a pixel has.
     pub fn samples(&self) -> u32 {
         self.positions.len() as u32
+    }
+
+    /// The standard pattern of Direct3D and Vulkan: of 1, 2, 4, 8 or 16 samples.
+    pub fn standard(samples: u32) -> Option<Self> {
+        let positions = STANDARD.into_iter().find(|p| p.len() == samples as usize)?.to_vec();
+        Some(SamplePattern { name: format!("standard-{samples}"), positions, nested: false })
     }
 
     /// Whether `n` is a sample count that a pattern can have: 1, 2, 4, … 64.
