@@ -11,10 +11,9 @@ use crate::capture::{
     Unseen,
 };
 use crate::cli::arguments::{self, colour, numbers, option, samples, size};
-use crate::cli::console::{Console, grouped, shown, table};
-use crate::cli::files::{JsonArgument, check, check_scene, report};
+use crate::cli::console::{Console, grouped, table};
+use crate::cli::files::{JsonArgument, check, check_scene, keep_trace, print_trace, report};
 use crate::cli::kind::{Kind, check_output};
-use crate::cli::signals::on_interrupt;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::capture::{CrossCheck, GpuCapture};
@@ -149,12 +148,6 @@ const DEFAULT_SIZE: [u32; 2] = [800, 800];
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let (source, path) = arguments::scene(&arguments.scene)?;
-    if arguments.output == Path::new("-") {
-        return Err(Error::config(
-            "a trace cannot go to standard output",
-            "name a file (./- for one that is called so)",
-        ));
-    }
     // A misspelt name and a machine without a GPU are told before anything is done.
     scene::check(source)?;
     let splats = SplatRules::parse(&arguments.splat_rules)?;
@@ -255,13 +248,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
             let header = ["our rasteriser against the GPU's", ""];
             console.print(format_args!("{}", table(&header, rows.into())))?;
         }
-        console.print(format_args!(
-            "{}: {} fragments, {:.1} MB, content {}",
-            shown(&document.trace),
-            grouped(written.rows),
-            written.bytes as f64 / 1e6,
-            &written.content[..16],
-        ))
+        print_trace(&document.trace, &written, written.rows, console)
     })
 }
 
@@ -360,8 +347,7 @@ impl Reporting<'_> {
             warnings.push(format!("the trace has no fragments: {}", why_empty(header)));
         }
         self.warn(&warnings, console)?;
-        file.commit()?;
-        on_interrupt(move || format!("{place} is whole and kept"));
+        keep_trace(file)?;
         Ok((written, unseen))
     }
 
