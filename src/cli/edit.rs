@@ -22,6 +22,9 @@ use crate::trace::{ColourFormat, Compression, Trace, TraceWriter, WriteOptions};
 
 /// Write a trace anew: with checksums, packed, colours in another precision
 #[derive(Debug, Args)]
+#[command(mut_arg("compress", |compress| {
+    compress.help("How its columns are stored, however they were before").default_value("none")
+}))]
 pub(super) struct ConvertArguments {
     /// The trace, of any program
     trace: PathBuf,
@@ -106,9 +109,9 @@ struct Target {
     /// The trace to write
     #[arg(long, short, value_name = "TRACE")]
     output: PathBuf,
-    /// How its columns are stored, however they were before
-    #[arg(long, default_value = "none", value_parser = option::<Compression>())]
-    compress: Compression,
+    /// How its columns are stored; where not given, as those of the (first) trace are
+    #[arg(long, value_parser = option::<Compression>())]
+    compress: Option<Compression>,
     #[command(flatten)]
     json: JsonArgument,
 }
@@ -192,9 +195,13 @@ impl Target {
         check_output(&self.output, Kind::Trace)?;
         let open = |path: &&Path| open_trace(path, console);
         let traces = inputs.iter().map(open).collect::<Result<Vec<Trace>>>()?;
+        let compression = match self.compress {
+            Some(compression) => compression,
+            None => traces[0].compression()?,
+        };
         let file = OutputFile::create(&self.output)?;
         let json = self.json.open()?;
-        Ok((traces, Files { compression: self.compress, file, json }))
+        Ok((traces, Files { compression, file, json }))
     }
 }
 
