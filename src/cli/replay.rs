@@ -307,6 +307,9 @@ fn print_counts(events: &EventCounts, console: &Console) -> Result<()> {
     }
     line("surfaces started", events.surfaces)?;
     line("layers compared", events.layers_compared)?;
+    if let Some(count) = events.multiplications {
+        line("multiplications", count)?;
+    }
     let [read, written] = events.state_bytes();
     line("state bytes read", read)?;
     line("state bytes written", written)

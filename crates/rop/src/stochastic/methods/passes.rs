@@ -120,6 +120,7 @@ impl<S: Sampler<N>, const N: usize> Methods<S, N> {
         }
         let bits = self.colour.channel_bits() * fragment.coverage.count();
         probe.state(bits, bits);
+        probe.multiplied(fragment.coverage.count());
     }
 
     /// E equations 4 and 6: the fragment, weighed by the share of the samples that it
@@ -135,6 +136,8 @@ impl<S: Sampler<N>, const N: usize> Methods<S, N> {
         let share = fragment.alpha * visible.count() as f32;
         sums.add(fragment.colour, share, share, self.colour);
         probe.written(visible);
+        // The colour with its alpha; how many samples show it is a number of samples.
+        probe.multiplied(3);
         // One sum a pixel: with a box filter it holds what a multisample buffer would.
         let sum = self.colour.texel_bits();
         probe.state(self.depth_bits * fragment.coverage.count() + sum, sum);
