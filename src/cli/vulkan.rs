@@ -268,13 +268,14 @@ fn given(folder: &Path) -> Result<Captures> {
 fn new_folder(path: &Path) -> Result<PathBuf> {
     let fail = |e| Error::io("make the folder", path, e);
     match std::fs::read_dir(path) {
-        Ok(mut entries) if entries.next().is_some() => {
-            return Err(Error::config(
-                format_args!("{} is not empty", path.display()),
-                "name a new folder to keep the capture in",
-            ));
+        Ok(mut entries) => {
+            if entries.next().is_some() {
+                return Err(Error::config(
+                    format_args!("{} is not empty", path.display()),
+                    "name a new folder to keep the capture in",
+                ));
+            }
         }
-        Ok(_) => {}
         Err(_) => std::fs::create_dir(path).map_err(fail)?,
     }
     path.canonicalize().map_err(fail)
