@@ -21,7 +21,7 @@ pub(super) enum Kind {
 
 impl Kind {
     /// What a name says by its ending; `None` where that says nothing of these.
-    fn of(path: &Path) -> Option<Kind> {
+    pub(super) fn of(path: &Path) -> Option<Kind> {
         let ending = path.extension()?.to_str()?.to_ascii_lowercase();
         Some(match &*ending {
             "arrow" => Kind::Trace,

@@ -24,8 +24,9 @@ use crate::study::run::{Runner, Shard, Store, Task, agree, check};
 /// again it goes on where it was interrupted
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
-    /// The study, a TOML file
-    file: PathBuf,
+    /// The study, a TOML file; or traces, on which the default study's designs are measured
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
     /// Where results and report go
     #[arg(long, short, value_name = "FOLDER")]
     output: PathBuf,
@@ -56,18 +57,25 @@ fn shard(text: &str) -> std::result::Result<Shard, String> {
 }
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
-    check_input(&arguments.file, Kind::Study)?;
-    let study = Study::read(&arguments.file)?;
+    let files = &arguments.files;
+    // What it names is seen from a study file's folder; what is named here, from where we are.
+    let (study, base) = match &files[..] {
+        [file] if Kind::of(file) != Some(Kind::Trace) => {
+            check_input(file, Kind::Study)?;
+            (Study::read(file)?, file.parent().unwrap_or(Path::new("")))
+        }
+        traces => {
+            traces.iter().try_for_each(|trace| check_input(trace, Kind::Trace))?;
+            (Study::of_traces(traces)?, Path::new(""))
+        }
+    };
+    let named: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
     let place = Place {
-        base: arguments.file.parent().unwrap_or(Path::new("")),
+        base,
         shard: arguments.shard,
         adapter: arguments.adapter.as_deref(),
         json: &arguments.json,
-        command: format!(
-            "screendoor study {} -o {}",
-            arguments.file.display(),
-            arguments.output.display()
-        ),
+        command: format!("screendoor study {} -o {}", named.join(" "), arguments.output.display()),
     };
     measured(&arguments.output, &study, place, console)
 }

@@ -3,6 +3,7 @@
 mod check;
 mod scene;
 mod text;
+mod traces;
 
 use std::path::Path;
 
@@ -98,6 +99,9 @@ pub struct Study {
     pub scenes: Vec<SceneEntry>,
 }
 
+/// The default study.
+const PRESET: &str = include_str!("default.toml");
+
 /// What a study file need not say.
 mod defaults {
     use super::{EngineName, Faces, Metric, Order, PatternKind};
@@ -165,7 +169,7 @@ impl Study {
     /// # Errors
     /// None: the file is tested.
     pub fn preset() -> Result<Self> {
-        Study::parse(include_str!("default.toml"), "the default study")
+        Study::parse(PRESET, "the default study")
     }
 
     /// The study as TOML, every default filled in.
