@@ -53,7 +53,7 @@ struct WithVulkan;
 
 impl Change for WithVulkan {
     fn change(argument: Arg) -> Arg {
-        argument.requires("vulkan")
+        if argument.get_id() == "vulkan" { argument } else { argument.requires("vulkan") }
     }
 }
 
