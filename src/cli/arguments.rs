@@ -2,12 +2,13 @@
 
 use std::ffi::OsStr;
 use std::fmt::Display;
+use std::marker::PhantomData;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use clap::builder::{PossibleValue, StringValueParser, TypedValueParser};
-use clap::{Arg, Args, Command};
+use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
 
 use crate::cli::console::Console;
 use crate::cli::files::open_trace;
@@ -157,6 +158,41 @@ impl MemoryArgument {
     /// In bytes.
     pub fn bytes(&self) -> u64 {
         self.memory << 20
+    }
+}
+
+/// Arguments of which each is changed in the same way.
+#[derive(Debug)]
+pub(super) struct Each<A, C> {
+    /// What was given.
+    pub given: A,
+    change: PhantomData<C>,
+}
+
+/// How arguments are changed.
+pub(super) trait Change {
+    /// The argument, changed.
+    fn change(argument: Arg) -> Arg;
+}
+
+impl<A: FromArgMatches, C> FromArgMatches for Each<A, C> {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        Ok(Each { given: A::from_arg_matches(matches)?, change: PhantomData })
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        self.given.update_from_arg_matches(matches)
+    }
+}
+
+impl<A: Args, C: Change> Args for Each<A, C> {
+    fn augment_args(command: Command) -> Command {
+        let own = A::augment_args(Command::new("own"));
+        own.get_arguments().fold(command, |command, arg| command.arg(C::change(arg.clone())))
+    }
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
     }
 }
 

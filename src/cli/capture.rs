@@ -3,14 +3,14 @@
 use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Arg, Args};
 use serde::Serialize;
 
 use crate::capture::{
     CameraChoice, CameraOptions, Capture, CaptureOptions, Faces, Order, PatternKind, SplatRules,
     Unseen,
 };
-use crate::cli::arguments::{self, colour, numbers, option, samples, size};
+use crate::cli::arguments::{self, Change, Each, colour, numbers, option, samples, size};
 use crate::cli::console::{Console, grouped, table};
 use crate::cli::files::{JsonArgument, check, check_scene, keep_trace, print_trace, report};
 use crate::cli::kind::{Kind, check_output};
@@ -29,11 +29,31 @@ use crate::trace::{
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     #[command(flatten)]
-    scene: SceneArguments,
+    scene: Each<SceneArguments, NotWithVulkan>,
     #[command(flatten)]
     pub common: CommonArguments,
     #[command(flatten, next_help_heading = "Another program's fragments, by a layer of Vulkan")]
-    vulkan: VulkanArguments,
+    vulkan: Each<VulkanArguments, WithVulkan>,
+}
+
+/// What is for scenes alone.
+#[derive(Debug)]
+struct NotWithVulkan;
+
+impl Change for NotWithVulkan {
+    fn change(argument: Arg) -> Arg {
+        argument.conflicts_with("vulkan")
+    }
+}
+
+/// What is for other programs alone.
+#[derive(Debug)]
+struct WithVulkan;
+
+impl Change for WithVulkan {
+    fn change(argument: Arg) -> Arg {
+        if argument.get_id() == "vulkan" { argument } else { argument.requires("vulkan") }
+    }
 }
 
 /// What a trace is made into, whatever it is of.
@@ -187,9 +207,10 @@ struct Document<'a> {
 const DEFAULT_SIZE: [u32; 2] = [800, 800];
 
 pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
-    match &arguments.scene.scene {
-        Some(scene) => run_scene(scene, &arguments.scene, &arguments.common, console),
-        None => vulkan::run(&arguments.vulkan, &arguments.common, console),
+    let (of_scene, of_program) = (&arguments.scene.given, &arguments.vulkan.given);
+    match &of_scene.scene {
+        Some(scene) => run_scene(scene, of_scene, &arguments.common, console),
+        None => vulkan::run(of_program, &arguments.common, console),
     }
 }
 

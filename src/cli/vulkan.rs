@@ -16,13 +16,12 @@ use crate::error::{Error, Result};
 use crate::output::{OutputFile, TemporaryFolder};
 use crate::trace::{TraceWriter, WriteOptions};
 use crate::vulkan::{
-    Captures, Conversion, ConvertOptions, Converted, DepthRule, Ended, ListedDevice, ListedPass,
-    Listing, Run, Settings, Span, TargetChoice, layer_library, why_nothing,
+    Captures, Check, Conversion, ConvertOptions, Converted, DepthRule, Ended, ListedDevice,
+    ListedPass, Listing, Run, Settings, Span, TargetChoice, layer_library, why_nothing,
 };
 
 /// What is captured of which program.
 #[derive(Debug, Args)]
-#[group(conflicts_with = "SceneArguments", requires = "vulkan")]
 pub(super) struct VulkanArguments {
     /// Run a program and record the fragments of a frame of it
     #[arg(long, group = "held_against")]
@@ -44,8 +43,8 @@ pub(super) struct VulkanArguments {
     /// What the trace's depths are
     #[arg(long, default_value = "auto", value_parser = option::<DepthRule>())]
     depth: DepthRule,
-    /// Print what passes there are and write no trace
-    #[arg(long)]
+    /// Print what passes there are, and write no trace
+    #[arg(long, conflicts_with = "check")]
     list: bool,
     /// Have Mesa run the program's OpenGL on Vulkan (zink)
     #[arg(long, conflicts_with = "from")]
@@ -81,6 +80,8 @@ struct Document<'a> {
     content: &'a str,
     #[serde(flatten)]
     converted: &'a Converted,
+    /// With `--check`: how far what was recorded is from the program's own picture.
+    check: Option<&'a Check>,
 }
 
 pub(super) fn run(
@@ -90,7 +91,7 @@ pub(super) fn run(
 ) -> Result<()> {
     let mut begun = Begun::new(arguments, common)?;
     let json = begun.json.take();
-    let captures = begun.capture(arguments, console)?;
+    let captures = begun.capture(arguments, common.check, console)?;
     if arguments.list {
         let progress = console.progress("counting", "fragments");
         let listing = Listing::new(&captures)?;
@@ -120,6 +121,9 @@ pub(super) fn run(
     let header = conversion.header();
     let mut writer = TraceWriter::new(file, &place, header.clone(), write)?;
     let converted = conversion.write(&mut writer, &mut |done, of| progress.set(done, of))?;
+    progress.name("blending as the program does");
+    let told = &mut |done, of| progress.set(done, of);
+    let checked = common.check.then(|| conversion.check(told)).transpose()?;
     drop(progress);
     let (file, written) = writer.finish()?;
     console.warn_all(&converted.warnings, common.strict, &header.source)?;
@@ -137,6 +141,7 @@ pub(super) fn run(
         bytes: written.bytes,
         content: &written.content,
         converted: &converted,
+        check: checked.as_ref(),
     };
     report(json, "screendoor.vulkan", &document, console, || {
         console.print(format_args!(
@@ -155,8 +160,28 @@ pub(super) fn run(
             converted.objects.len(),
             written.bytes as f64 / 1e6,
             &written.content[..16],
-        ))
+        ))?;
+        checked.iter().try_for_each(|check| print_check(check, console))
     })
+}
+
+/// Prints how far what was recorded is from the program's own picture.
+fn print_check(check: &Check, console: &Console) -> Result<()> {
+    for caveat in &check.caveats {
+        console.print(format_args!("not done again: {}", shown(caveat)))?;
+    }
+    if let Some(why) = &check.incomparable {
+        return console.print(format_args!("not held against its picture: {}", shown(why)));
+    }
+    let beyond = check.beyond.iter();
+    let beyond = beyond.map(|b| format!("{} by more than {}", grouped(b.pixels), b.units));
+    console.print(format_args!(
+        "held against the program's picture: of {} pixels {} are exact, {}; {:.2} of 255 at most",
+        grouped(check.pixels),
+        grouped(check.exact),
+        beyond.collect::<Vec<_>>().join(", "),
+        check.greatest
+    ))
 }
 
 impl VulkanArguments {
@@ -208,7 +233,12 @@ impl Begun {
     }
 
     /// Runs the program, where one is to be run, and reads what is there.
-    fn capture(&self, arguments: &VulkanArguments, console: &Console) -> Result<Captures> {
+    fn capture(
+        &self,
+        arguments: &VulkanArguments,
+        pictures: bool,
+        console: &Console,
+    ) -> Result<Captures> {
         let folder = match &self.folder {
             Folder::Given(folder) => return given(folder),
             Folder::Kept(folder) => folder.as_path(),
@@ -225,6 +255,7 @@ impl Begun {
                 span: arguments.span(),
                 location: arguments.location,
                 capacity: arguments.capacity.unwrap_or(own.capacity),
+                pictures,
                 ..own
             },
             library: layer_library()?,
@@ -243,7 +274,7 @@ impl Begun {
         let captures = Captures::read(folder)?;
         if captures.is_empty() {
             let (what, hint) = why_nothing(program);
-            return Err(Error::config(what, hint));
+            return Err(Error::unsupported(name, what, hint));
         }
         Ok(match ended {
             Ended::Signal(_) => captures.broken_off(),
@@ -267,15 +298,14 @@ fn given(folder: &Path) -> Result<Captures> {
 /// A folder that is new, or has nothing in it, from the root on.
 fn new_folder(path: &Path) -> Result<PathBuf> {
     let fail = |e| Error::io("make the folder", path, e);
-    match std::fs::read_dir(path) {
-        Ok(mut entries) => {
-            if entries.next().is_some() {
-                return Err(Error::config(
-                    format_args!("{} is not empty", path.display()),
-                    "name a new folder to keep the capture in",
-                ));
-            }
+    match std::fs::read_dir(path).map(|mut entries| entries.next().is_some()) {
+        Ok(true) => {
+            return Err(Error::config(
+                format_args!("{} is not empty", path.display()),
+                "name a new folder to keep the capture in",
+            ));
         }
+        Ok(false) => {}
         Err(_) => std::fs::create_dir(path).map_err(fail)?,
     }
     path.canonicalize().map_err(fail)

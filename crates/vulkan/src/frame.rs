@@ -115,8 +115,7 @@ pub(crate) fn last_whole(capture: &DeviceCapture, span: Span) -> Result<Frame> {
     }
     let place = capture.device.program.clone();
     let Some(last) = frames.last() else {
-        let (what, hint) = none(capture, span);
-        return Err(Error::config(what, hint));
+        return Err(none(capture, span));
     };
     let name = last.name(capture);
     Err(match last.flaw(capture) {
@@ -136,38 +135,40 @@ pub(crate) fn last_whole(capture: &DeviceCapture, span: Span) -> Result<Frame> {
     })
 }
 
-/// What is said where nothing of `span` was recorded.
-fn none(capture: &DeviceCapture, span: Span) -> (String, String) {
+/// The error where nothing of `span` was recorded.
+fn none(capture: &DeviceCapture, span: Span) -> Error {
     let program = &capture.device.program;
-    let frames = capture.presents.iter().map(|p| p.frame + 1).max().unwrap_or(0);
     match span {
         Span::Frames(first, last) => {
-            let wanted =
-                if first == last { format!("frame {first}") } else { format!("{first}-{last}") };
-            let what = match frames {
-                0 => format!("{wanted} was not captured: {program} has presented none"),
-                n => format!("{wanted} was not captured: {program} has presented {n}"),
+            let wanted = match first == last {
+                true => format!("frame {first} was"),
+                false => format!("frames {first}-{last} were"),
             };
-            let hint = match frames {
-                0 => "give --submits for what is never presented",
-                _ => "frames are counted from 0: ask for another, or let the program run longer",
+            let frames = capture.presents.iter().map(|p| p.frame + 1).max().unwrap_or(0);
+            let (presented, hint) = match frames {
+                0 => ("none".to_string(), "give --submits for what is never presented"),
+                n => (
+                    n.to_string(),
+                    "frames are counted from 0: ask for another, or let the program run longer",
+                ),
             };
-            (what, hint.to_string())
+            let what = format!("{wanted} not captured: {program} has presented {presented}");
+            Error::config(what, hint)
         }
         Span::Submissions(first, last) => {
-            let what = match capture.submissions.last() {
-                None => format!("of submissions {first}-{last} of {program} nothing was captured"),
-                Some(s) => {
-                    format!(
-                        "submissions {first}-{last} of {program} were not captured, but others up to {}",
-                        s.number
-                    )
-                }
+            let others = match capture.submissions.last() {
+                None => String::new(),
+                Some(other) => format!(", but others up to {}", other.number),
             };
-            (what, "submissions are counted from 0 on each device: ask for others".to_string())
+            Error::config(
+                format_args!("submissions {first}-{last} of {program} were not captured{others}"),
+                "submissions are counted from 0 on each device: ask for others",
+            )
         }
-        Span::First => {
-            (format!("{program} submitted nothing that leaves fragments"), "see --list".to_string())
-        }
+        Span::First => Error::unsupported(
+            program,
+            "it submitted nothing that leaves fragments",
+            "ask for what it does later with --frame or --submits, and see --list",
+        ),
     }
 }

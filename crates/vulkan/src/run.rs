@@ -197,9 +197,8 @@ fn ended(status: ExitStatus) -> Ended {
 
 /// Why a program may have left nothing, not even that it has a device.
 pub fn why_nothing(program: &OsStr) -> (String, String) {
-    let name = program.display();
     let file = on_path(program);
-    let what = format!("{name} left nothing: it has opened no Vulkan device under the layer");
+    let what = "it has opened no Vulkan device under the layer".to_string();
     if let Some(file) = &file
         && is_set_id(file)
     {

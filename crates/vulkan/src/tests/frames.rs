@@ -64,7 +64,7 @@ fn frames_that_never_came_are_told_of() {
     assert!(error.contains("submissions 7-8 of prog were not captured"), "{error}");
     let mut made = Made::new();
     let error = made.error(of(Span::First));
-    assert!(error.contains("prog submitted nothing that leaves fragments"), "{error}");
+    assert!(error.contains("prog: it submitted nothing that leaves fragments"), "{error}");
     made.submit(vec![begin(pass(CLEAR, BLACK)), draw(over(0))], vec![grey(0, 0, 0.5)]);
     let error = made.error(of(Span::Frames(1, 1)));
     assert!(error.contains("has presented none") && error.contains("--submits"), "{error}");
