@@ -15,7 +15,7 @@ pub(super) struct Entry {
     pub(super) name: Vec<u32>,
     /// Variables as they are listed.
     pub(super) listed: Vec<u32>,
-    /// Inputs and outputs among them, each once.
+    /// Those of them that the module declares, each once.
     pub(super) interface: BTreeSet<u32>,
     /// Those that a function names, or that have a value without.
     pub(super) used: BTreeSet<u32>,

@@ -24,7 +24,8 @@ const FRONT: u32 = 1 << 31;
 /// entry point (`discard` as `OpKill`), the slopes of depth are taken before it, since a derivative
 /// needs its neighbours: two differences, which is less than to wait for the word there. And the
 /// inputs are there whether they are read or not, and a shader that can write to memory is run
-/// before the depth test; that is in the shader's nature, not in what it executes.
+/// before the depth test, so that hidden fragments are shaded too: that is in what the shader is,
+/// not in what it does.
 pub fn fragment(
     words: &[u32],
     entry: &str,
@@ -56,7 +57,8 @@ pub fn fragment(
     e.call();
     let enabled = buffers.enabled(&mut e);
     let recorded = e.begin_if(enabled);
-    // All of a draw is here or nothing: derivatives are as good as outside.
+    // All invocations get here or none does, since none ended before, and those that returned early
+    // are back: derivatives are as good as outside.
     let position = match early {
         Some(position) => position,
         None => Position::load(&mut e, &inputs, sloped)?,

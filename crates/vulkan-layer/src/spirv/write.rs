@@ -53,8 +53,8 @@ impl Editor<'_> {
                         words.extend(&i.words[2..]);
                     }
                 }
-                op::MEMORY_MODEL if self.addressing.is_some() => {
-                    let addressing = self.addressing.unwrap_or_default();
+                op::MEMORY_MODEL => {
+                    let addressing = self.addressing.map_or_else(|| i.operand(0), Ok)?;
                     words.extend(instruction(op::MEMORY_MODEL, &[addressing, i.operand(1)?]));
                 }
                 _ => words.extend(i.words),

@@ -116,3 +116,22 @@ fn what_was_rewritten_can_be_rewritten() {
         }
     }
 }
+
+/// The corpus has versions 1.0 and from 1.3 on; what is valid in 1.0 is in these two as well.
+#[test]
+fn versions_between_are_rewritten_too() {
+    let there = validator::is_there();
+    for name in ["plain.frag", "discard.frag", "mask.frag", "asm_groups.frag"] {
+        for version in [0x0001_0100, 0x0001_0200] {
+            let mut module = corpus::module(name);
+            module.words[1] = version;
+            for rewrite in rewrites(&module) {
+                let (words, _) = rewrite.run(&module.words).unwrap();
+                check::check(&module, &words, rewrite.model, &rewrite.entry);
+                if there {
+                    assert_eq!(validator::complaint(&words, "vulkan1.1"), None, "{name}");
+                }
+            }
+        }
+    }
+}
