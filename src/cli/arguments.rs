@@ -181,6 +181,21 @@ impl<A: Args, C: Change> Args for Each<A, C> {
     }
 }
 
+/// What a command may take for what grows with a trace. What that is there, each command says as
+/// the argument's help.
+#[derive(Debug, Args)]
+pub(super) struct MemoryArgument {
+    #[arg(long, default_value_t = 512, value_name = "MIB", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=1 << 20))]
+    memory: u64,
+}
+
+impl MemoryArgument {
+    /// In bytes.
+    pub fn bytes(&self) -> u64 {
+        self.memory << 20
+    }
+}
+
 fn setting(text: &str) -> Result<(String, String), String> {
     parse_setting(text).map_err(|e| e.to_string())
 }

@@ -11,10 +11,9 @@ use crate::capture::{
     Unseen,
 };
 use crate::cli::arguments::{self, Change, Each, colour, numbers, option, samples, size};
-use crate::cli::console::{Console, grouped, shown, table};
-use crate::cli::files::{JsonArgument, check, check_scene, report};
+use crate::cli::console::{Console, grouped, table};
+use crate::cli::files::{JsonArgument, check, check_scene, keep_trace, print_trace, report};
 use crate::cli::kind::{Kind, check_output};
-use crate::cli::signals::on_interrupt;
 use crate::cli::vulkan::{self, VulkanArguments};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
@@ -98,12 +97,6 @@ impl CommonArguments {
     pub fn output(&self) -> Result<&Path> {
         let none = || Error::config("it is not said where the trace goes", "name it with -o");
         let output = self.output.as_deref().ok_or_else(none)?;
-        if output == Path::new("-") {
-            return Err(Error::config(
-                "a trace cannot go to standard output",
-                "name a file (./- for one that is called so)",
-            ));
-        }
         check_output(output, Kind::Trace)?;
         Ok(output)
     }
@@ -321,13 +314,7 @@ fn run_scene(
             let header = ["our rasteriser against the GPU's", ""];
             console.print(format_args!("{}", table(&header, rows.into())))?;
         }
-        console.print(format_args!(
-            "{}: {} fragments, {:.1} MB, content {}",
-            shown(&document.trace),
-            grouped(written.rows),
-            written.bytes as f64 / 1e6,
-            &written.content[..16],
-        ))
+        print_trace(&document.trace, &written, written.rows, console)
     })
 }
 
@@ -426,8 +413,7 @@ impl Reporting<'_> {
             warnings.push(format!("the trace has no fragments: {}", why_empty(header)));
         }
         console.warn_all(&warnings, self.strict, &self.scene.source)?;
-        file.commit()?;
-        on_interrupt(move || format!("{place} is whole and kept"));
+        keep_trace(file)?;
         Ok((written, unseen))
     }
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde::Serialize;
 
+use crate::cli::arguments::MemoryArgument;
 use crate::cli::console::{Console, grouped, shown};
 use crate::cli::files::{JsonArgument, check, open_trace, report};
 use crate::edit::{
@@ -16,14 +17,16 @@ use crate::trace::{ColumnId, ColumnKind, Scalar, Trace};
 /// Compare two traces fragment by fragment; ends with 3 where anything differs that a replay can
 /// depend on
 #[derive(Debug, Args)]
+#[command(mut_arg("memory", |memory| {
+    memory.help("MiB that pixels and fragments may take that are looked at; less takes more passes")
+}))]
 pub(super) struct Arguments {
     /// A trace
     first: PathBuf,
     /// Another one
     second: PathBuf,
-    /// MiB that pixels and fragments may take that are looked at; less takes more passes
-    #[arg(long, default_value_t = 512, value_name = "MIB", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=1 << 20))]
-    memory: u64,
+    #[command(flatten)]
+    memory: MemoryArgument,
     #[command(flatten)]
     json: JsonArgument,
 }
@@ -48,7 +51,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let size = |trace: &Trace| (trace.header().width, trace.header().height);
     let compare = || {
         let progress = console.progress("comparing", "rows of pixels");
-        difference([&a, &b], arguments.memory << 20, &mut |done, of| progress.set(done, of))
+        difference([&a, &b], arguments.memory.bytes(), &mut |done, of| progress.set(done, of))
     };
     let fragments = (size(&a) == size(&b)).then(compare).transpose()?;
     let alike = fragments.as_ref().is_some_and(|found| found.same <= Kept::Pixels);

@@ -6,21 +6,23 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde::Serialize;
 
-use crate::cli::arguments::{option, range, samples, size};
-use crate::cli::console::{Console, grouped, shown};
-use crate::cli::files::{Json, JsonArgument, check, open_trace, report};
+use crate::cli::arguments::{MemoryArgument, option, range, samples, size};
+use crate::cli::console::{Console, grouped};
+use crate::cli::files::{Json, JsonArgument, check, keep_trace, open_trace, print_trace, report};
 use crate::cli::kind::{Kind, check_output};
-use crate::cli::signals::on_interrupt;
 use crate::edit::{
     Area, Constants, Convert, ConvertOptions, Edit, Merge, MergeOptions, Sequence, Shuffle,
     ShuffleOptions, Trim, TrimOptions, write,
 };
 use crate::error::{Error, Result};
 use crate::output::OutputFile;
-use crate::trace::{ColourFormat, Compression, Trace, TraceWriter, WriteOptions, Written};
+use crate::trace::{ColourFormat, Compression, Trace, TraceWriter, WriteOptions};
 
 /// Write a trace anew: with checksums, packed, colours in another precision
 #[derive(Debug, Args)]
+#[command(mut_arg("compress", |compress| {
+    compress.help("How its columns are stored, however they were before").default_value("none")
+}))]
 pub(super) struct ConvertArguments {
     /// The trace, of any program
     trace: PathBuf,
@@ -81,6 +83,9 @@ pub(super) struct JoinArguments {
 
 /// Put a trace's fragments in another order
 #[derive(Debug, Args)]
+#[command(mut_arg("memory", |memory| {
+    memory.help("MiB that fragments may take that are held together; less takes more passes")
+}))]
 pub(super) struct ShuffleArguments {
     /// The trace
     trace: PathBuf,
@@ -92,9 +97,8 @@ pub(super) struct ShuffleArguments {
     /// Which of the random orders
     #[arg(long, default_value_t = 0, value_name = "N", allow_negative_numbers = true)]
     seed: u32,
-    /// MiB that fragments may take that are held together; less takes more passes
-    #[arg(long, default_value_t = 512, value_name = "MIB", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=1 << 20))]
-    memory: u64,
+    #[command(flatten)]
+    memory: MemoryArgument,
 }
 
 /// Where the new trace goes.
@@ -103,9 +107,9 @@ struct Target {
     /// The trace to write
     #[arg(long, short, value_name = "TRACE")]
     output: PathBuf,
-    /// How its columns are stored, however they were before
-    #[arg(long, default_value = "none", value_parser = option::<Compression>())]
-    compress: Compression,
+    /// How its columns are stored; where not given, as those of the (first) trace are
+    #[arg(long, value_parser = option::<Compression>())]
+    compress: Option<Compression>,
     #[command(flatten)]
     json: JsonArgument,
 }
@@ -127,7 +131,7 @@ struct Document<'a> {
 }
 
 pub(super) fn run_convert(arguments: &ConvertArguments, console: &Console) -> Result<()> {
-    let begun = arguments.target.begin(&[&arguments.trace], console)?;
+    let (traces, files) = arguments.target.begin(&[&arguments.trace], console)?;
     let options = ConvertOptions {
         colour: match (arguments.half_colour, arguments.float_colour) {
             (true, _) => Some(ColourFormat::F16),
@@ -137,16 +141,9 @@ pub(super) fn run_convert(arguments: &ConvertArguments, console: &Console) -> Re
         constants: arguments.constants,
     };
     let progress = console.progress("looking at columns", "fragments");
-    let told = &mut |done, of| progress.set(done, of);
-    let traces = begun.traces.clone();
-    let convert = Convert::new(&traces[0], options, told)?;
-    let rounded = convert.rounded(told)?;
+    let convert = Convert::new(&traces[0], options, &mut |done, of| progress.set(done, of))?;
     drop(progress);
-    if rounded > 0 {
-        let rounded = grouped(rounded);
-        console.warn(&format!("half precision rounds the colours of {rounded} fragments"));
-    }
-    begun.save(&convert, rounded, console)
+    files.save(&convert, &traces, console)
 }
 
 pub(super) fn run_trim(arguments: &TrimArguments, console: &Console) -> Result<()> {
@@ -160,33 +157,29 @@ pub(super) fn run_trim(arguments: &TrimArguments, console: &Console) -> Result<(
             "give --area, --samples, --rows, --primitives or --objects",
         ));
     }
-    let begun = arguments.target.begin(&[&arguments.trace], console)?;
-    let traces = begun.traces.clone();
-    begun.save(&Trim::new(&traces[0], options)?, 0, console)
+    let (traces, files) = arguments.target.begin(&[&arguments.trace], console)?;
+    files.save(&Trim::new(&traces[0], options)?, &traces, console)
 }
 
 pub(super) fn run_join(arguments: &JoinArguments, console: &Console) -> Result<()> {
     let inputs: Vec<&Path> = arguments.traces.iter().map(|path| &**path).collect();
-    let begun = arguments.target.begin(&inputs, console)?;
-    let traces = begun.traces.clone();
+    let (traces, files) = arguments.target.begin(&inputs, console)?;
     let merge = Merge::new(&traces, MergeOptions { keep_numbers: arguments.keep_numbers })?;
     if merge.lost_view() {
         console.warn("the traces do not have one view, so the new one has none");
     }
-    begun.save(&merge, 0, console)
+    files.save(&merge, &traces, console)
 }
 
 pub(super) fn run_shuffle(arguments: &ShuffleArguments, console: &Console) -> Result<()> {
-    let begun = arguments.target.begin(&[&arguments.trace], console)?;
-    let traces = begun.traces.clone();
-    let ShuffleArguments { order, seed, memory, .. } = *arguments;
-    let options = ShuffleOptions { order, seed, memory: memory << 20 };
-    begun.save(&Shuffle::new(&traces[0], options)?, 0, console)
+    let (traces, files) = arguments.target.begin(&[&arguments.trace], console)?;
+    let ShuffleArguments { order, seed, .. } = *arguments;
+    let options = ShuffleOptions { order, seed, memory: arguments.memory.bytes() };
+    files.save(&Shuffle::new(&traces[0], options)?, &traces, console)
 }
 
-/// The traces, open, and the files to write, begun.
-struct Begun {
-    traces: Vec<Trace>,
+/// The files to write, begun.
+struct Files {
     compression: Compression,
     file: OutputFile,
     json: Option<Json>,
@@ -194,29 +187,27 @@ struct Begun {
 
 impl Target {
     /// Checks the files, opens the traces and begins what is written.
-    fn begin(&self, inputs: &[&Path], console: &Console) -> Result<Begun> {
-        if self.output == Path::new("-") {
-            return Err(Error::config(
-                "a trace cannot go to standard output",
-                "name a file (./- for one that is called so)",
-            ));
-        }
+    fn begin(&self, inputs: &[&Path], console: &Console) -> Result<(Vec<Trace>, Files)> {
         let outputs: Vec<&Path> = [&*self.output].into_iter().chain(self.json.path()).collect();
         check(inputs, &outputs)?;
         check_output(&self.output, Kind::Trace)?;
         let open = |path: &&Path| open_trace(path, console);
         let traces = inputs.iter().map(open).collect::<Result<Vec<Trace>>>()?;
+        let compression = match self.compress {
+            Some(compression) => compression,
+            None => traces[0].compression()?,
+        };
         let file = OutputFile::create(&self.output)?;
         let json = self.json.open()?;
-        Ok(Begun { traces, compression: self.compress, file, json })
+        Ok((traces, Files { compression, file, json }))
     }
 }
 
-impl Begun {
+impl Files {
     /// Writes the new trace, and says so. What of the old ones no trace has is named.
-    fn save(self, edit: &dyn Edit, rounded: u64, console: &Console) -> Result<()> {
-        let Begun { traces, compression, file, json } = self;
-        for trace in &traces {
+    fn save(self, edit: &dyn Edit, traces: &[Trace], console: &Console) -> Result<()> {
+        let Files { compression, file, json } = self;
+        for trace in traces {
             let lost = trace.extra_columns().iter().map(|(name, _)| format!("column '{name}'"));
             let lost = lost.chain(trace.extra_metadata().map(|key| format!("entry '{key}'")));
             let lost: Vec<String> = lost.collect();
@@ -237,12 +228,12 @@ impl Begun {
         if written.rows == 0 && before > 0 {
             console.warn("the new trace has no fragments");
         }
-        file.commit()?;
-        on_interrupt({
-            let place = place.clone();
-            move || format!("{place} is whole and kept")
-        });
-        let Written { rows, content, bytes } = &written;
+        let rounded = edit.rounded();
+        if rounded > 0 {
+            let rounded = grouped(rounded);
+            console.warn(&format!("half precision rounds the colours of {rounded} fragments"));
+        }
+        keep_trace(file)?;
         let document = Document {
             trace: place,
             from: traces.iter().map(Trace::place).collect(),
@@ -250,23 +241,13 @@ impl Begun {
             height: header.height,
             samples: header.pattern.samples(),
             fragments_before: before,
-            fragments: *rows,
+            fragments: written.rows,
             rounded,
-            bytes: *bytes,
-            content,
+            bytes: written.bytes,
+            content: &written.content,
         };
         report(json, "screendoor.edit", &document, console, || {
-            let of = match before {
-                before if before == *rows => String::new(),
-                before => format!(" of {}", grouped(before)),
-            };
-            console.print(format_args!(
-                "{}: {}{of} fragments, {:.1} MB, content {}",
-                shown(&document.trace),
-                grouped(*rows),
-                *bytes as f64 / 1e6,
-                &content[..16],
-            ))
+            print_trace(&document.trace, &written, before, console)
         })
     }
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use clap::Args;
 
-use crate::cli::arguments::{RunArguments, numbers};
+use crate::cli::arguments::{MemoryArgument, RunArguments, numbers};
 use crate::cli::console::{Console, shown};
 use crate::cli::files::{JsonArgument, check, report};
 use crate::error::{Error, Result};
@@ -15,6 +15,9 @@ use crate::trace::{SampleMask, Unorm32};
 
 /// Show what a design does at one pixel, fragment by fragment
 #[derive(Debug, Args)]
+#[command(mut_arg("memory", |memory| {
+    memory.help("MiB that the story may take, as text too; a longer one is refused")
+}))]
 pub(super) struct Arguments {
     #[command(flatten)]
     run: RunArguments,
@@ -24,9 +27,8 @@ pub(super) struct Arguments {
     /// Show only the last N fragments
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     last: Option<usize>,
-    /// MiB that the story may take, as text too; a longer one is refused
-    #[arg(long, default_value_t = 512, value_name = "MIB", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=1 << 20))]
-    memory: u64,
+    #[command(flatten)]
+    memory: MemoryArgument,
     #[command(flatten)]
     json: JsonArgument,
 }
@@ -48,7 +50,8 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let watch = |done, total| progress.set(done, total);
     let place = (&trace, trace.place());
     let last = arguments.last.unwrap_or(usize::MAX);
-    let limits = ExplainLimits { last, memory: arguments.memory << 20, ..ExplainLimits::default() };
+    let limits =
+        ExplainLimits { last, memory: arguments.memory.bytes(), ..ExplainLimits::default() };
     let document = Explained::of(&design, place, samples, seed, site, limits, &watch)?;
     drop(progress);
     let explanation = &document.explanation;

@@ -7,13 +7,14 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde::Serialize;
 
-use crate::cli::console::Console;
+use crate::cli::console::{Console, grouped, shown};
 use crate::cli::kind::{Kind, check_input, check_output};
+use crate::cli::signals::on_interrupt;
 use crate::error::{Error, Result};
 use crate::output::{OutputFile, same_file};
 use crate::picture::{Layer, Picture, PictureFile};
 use crate::scene::Scene;
-use crate::trace::Trace;
+use crate::trace::{Trace, Written};
 
 /// Refuses a folder in place of an input, and an output that is an input or
 /// another output: writing it would destroy what was read or written before.
@@ -92,6 +93,35 @@ pub(super) fn open_trace(path: &Path, console: &Console) -> Result<Trace> {
         console.warn(&format!("{}: written without checksums by another program", trace.place()));
     }
     Ok(trace)
+}
+
+/// Puts a trace in its place. It stays there whatever comes after, which who interrupts the
+/// program is told.
+pub(super) fn keep_trace(file: OutputFile) -> Result<()> {
+    let place = file.path().display().to_string();
+    file.commit()?;
+    on_interrupt(move || format!("{place} is whole and kept"));
+    Ok(())
+}
+
+/// Prints what was written as a trace, of `before` fragments.
+pub(super) fn print_trace(
+    place: &str,
+    written: &Written,
+    before: u64,
+    console: &Console,
+) -> Result<()> {
+    let of = match before {
+        before if before == written.rows => String::new(),
+        before => format!(" of {}", grouped(before)),
+    };
+    console.print(format_args!(
+        "{}: {}{of} fragments, {:.1} MB, content {}",
+        shown(place),
+        grouped(written.rows),
+        written.bytes as f64 / 1e6,
+        &written.content[..16],
+    ))
 }
 
 /// Where a command writes its figures as JSON; the same for every command.

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use crate::cli::arguments::MemoryArgument;
 use crate::cli::console::{Console, grouped, shown};
 use crate::cli::files::{JsonArgument, check, open_trace, report};
 use crate::error::Result;
@@ -12,12 +13,14 @@ use crate::trace::{Checksums, Header, Statistics, Trace, View, statistics_within
 
 /// Show what a user wants to know first about a trace
 #[derive(Debug, Args)]
+#[command(mut_arg("memory", |memory| {
+    memory.help("MiB that the search for fragments at one depth may take; less takes longer")
+}))]
 pub(super) struct Arguments {
     /// The trace
     trace: PathBuf,
-    /// MiB that the search for fragments at one depth may take; less takes longer
-    #[arg(long, default_value_t = 512, value_name = "MIB", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=1 << 20))]
-    memory: u64,
+    #[command(flatten)]
+    memory: MemoryArgument,
     #[command(flatten)]
     json: JsonArgument,
 }
@@ -41,7 +44,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let trace = open_trace(&arguments.trace, console)?;
     let json = arguments.json.open()?;
     let progress = console.progress("counting", "fragments");
-    let memory = arguments.memory << 20;
+    let memory = arguments.memory.bytes();
     let mut last = 0;
     let stats = statistics_within(&trace, memory, |done, total| {
         if done < last {

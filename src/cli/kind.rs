@@ -63,8 +63,15 @@ impl Kind {
     }
 }
 
-/// Refuses an output whose name says that it is something else.
+/// Refuses an output whose name says that it is something else, and a trace on standard output:
+/// it is whole or not there, which a pipe cannot be.
 pub(super) fn check_output(path: &Path, kind: Kind) -> Result<()> {
+    if kind == Kind::Trace && path == Path::new("-") {
+        return Err(Error::config(
+            "a trace cannot go to standard output",
+            "name a file (./- for one that is called so)",
+        ));
+    }
     match Kind::of(path) {
         // A folder may be called so, if it is one.
         Some(_) if kind == Kind::Folder && path.is_dir() => Ok(()),
@@ -152,7 +159,8 @@ mod tests {
             assert!(check_output(Path::new(name), Kind::Folder).is_err());
         }
         for neutral in ["a", "a.b", "/dev/stdout", "-", "t.ipc"] {
-            assert!(check_output(Path::new(neutral), Kind::Trace).is_ok());
+            let written = check_output(Path::new(neutral), Kind::Trace);
+            assert_eq!(written.is_ok(), neutral != "-", "{neutral}");
             assert!(check_input(Path::new(neutral), Kind::Trace).is_ok());
         }
     }

@@ -6,7 +6,7 @@ use std::time::Instant;
 use clap::Args;
 use serde::Serialize;
 
-use crate::cli::arguments::{RunArguments, engine_name, seeds};
+use crate::cli::arguments::{MemoryArgument, RunArguments, engine_name, seeds};
 use crate::cli::console::{Console, grouped, shown};
 use crate::cli::files::{JsonArgument, check, report, write_pictures};
 use crate::design::{Configured, REFERENCE, configure};
@@ -21,6 +21,9 @@ use crate::trace::Trace;
 
 /// Replay a trace through a design: a picture, its error, what the ROP did
 #[derive(Debug, Args)]
+#[command(mut_arg("memory", |memory| {
+    memory.help("MiB that the exact answer's fragments may take at a time")
+}))]
 pub(super) struct Arguments {
     #[command(flatten)]
     run: RunArguments,
@@ -43,9 +46,8 @@ pub(super) struct Arguments {
     /// The GPU to use: a part of its name or of its driver's
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
-    /// MiB that the exact answer's fragments may take at a time
-    #[arg(long, default_value_t = 512, value_name = "MIB", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=1 << 20))]
-    memory: u64,
+    #[command(flatten)]
+    memory: MemoryArgument,
     /// Fragments that are binned at a time, at most
     #[arg(long, default_value_t = 1 << 19, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=1 << 30))]
     window: u64,
@@ -103,7 +105,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let options = ReplayOptions {
         count_events: true,
         window: arguments.window as usize,
-        memory: arguments.memory << 20,
+        memory: arguments.memory.bytes(),
         progress: &watch,
         ..ReplayOptions::default()
     };
@@ -305,6 +307,9 @@ fn print_counts(events: &EventCounts, console: &Console) -> Result<()> {
     }
     line("surfaces started", events.surfaces)?;
     line("layers compared", events.layers_compared)?;
+    if let Some(count) = events.multiplications {
+        line("multiplications", count)?;
+    }
     let [read, written] = events.state_bytes();
     line("state bytes read", read)?;
     line("state bytes written", written)

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 
-use crate::cli::arguments::{design_list, engine_name, option, samples};
+use crate::cli::arguments::{MemoryArgument, design_list, engine_name, option, samples};
 use crate::cli::console::{Console, grouped, shown, table};
 use crate::cli::files::{JsonArgument, check, open_trace, report};
 use crate::error::Result;
@@ -17,6 +17,9 @@ use crate::study::throughput::{Plan, Spread, Throughput, measure};
 
 /// Measure how fast engines replay a trace: fragments, samples and bytes a second
 #[derive(Debug, Args)]
+#[command(mut_arg("memory", |memory| {
+    memory.help("MiB that a design may take whose state grows with the fragments")
+}))]
 pub(super) struct Arguments {
     /// The trace
     trace: PathBuf,
@@ -39,9 +42,8 @@ pub(super) struct Arguments {
     /// How often each is measured, after one replay that warms up
     #[arg(long, default_value_t = 5, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u16).range(1..=1000))]
     runs: u16,
-    /// MiB that a design may take whose state grows with the fragments
-    #[arg(long, default_value_t = 512, value_name = "MIB", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=1 << 20))]
-    memory: u64,
+    #[command(flatten)]
+    memory: MemoryArgument,
     #[command(flatten)]
     json: JsonArgument,
 }
@@ -86,7 +88,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         designs,
         samples,
         runs: usize::from(arguments.runs),
-        memory: arguments.memory << 20,
+        memory: arguments.memory.bytes(),
     };
     let progress = console.progress("measuring", "replays");
     let results = measure(&trace, &engines, &plan, &|name, done, total| {

@@ -25,6 +25,7 @@ mod limits;
 mod loaders;
 mod measured;
 mod models;
+mod multiplications;
 #[cfg(feature = "probe")]
 mod optional;
 mod python;

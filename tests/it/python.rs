@@ -104,7 +104,7 @@ fn record(design: &str, rmse: f64) -> Record {
         "events": {
             "fragments": 5, "samples_tested": 6, "samples_passed": 7, "samples_written": 8,
             "hashes": u64::MAX, "sorts_by_length": [0, 0, 3], "surfaces": 9,
-            "layers_compared": 12,
+            "layers_compared": 12, "multiplications": 13,
             "state_bits_read": 10, "state_bits_written": 11,
         },
         "state_bits": {"samples": 512, "extra": 42, "unbounded": false}, "passes": 1,
@@ -142,7 +142,7 @@ for row, record in zip(rows, records):
         seen += 1
     derived = {name for name, value in row.items() if value is not None} - set(own)
     assert derived == set("""state_bytes bytes_moved_per_fragment hashes_per_fragment
-        comparators_per_fragment tied_share unbiased_here nanoseconds_per_fragment.fast.low
+        comparators_per_fragment multiplications_per_fragment tied_share unbiased_here nanoseconds_per_fragment.fast.low
         nanoseconds_per_fragment.fast.median nanoseconds_per_fragment.fast.high""".split()), derived
 print(seen)
 "#;

@@ -24,6 +24,8 @@ impl Blueprint for AlphaToCoverage {
         combinations: &[],
     };
 
+    const MULTIPLICATIONS: bool = true;
+
     type At<const N: usize> = Stochastic<FixedMask, N>;
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {

@@ -30,6 +30,8 @@ pub struct Entry {
     primitive_depths: bool,
     /// The optional columns that are read.
     columns: ColumnSet,
+    /// Whether it tells its multiplications.
+    multiplications: bool,
 }
 
 /// Calls a function with the frame's sample count as a constant.
@@ -87,6 +89,7 @@ impl Entry {
             ported: B::PORTED,
             primitive_depths: B::PRIMITIVE_DEPTHS,
             columns: B::COLUMNS,
+            multiplications: B::MULTIPLICATIONS,
         }
     }
 
@@ -168,7 +171,12 @@ impl Configured {
         options: &ReplayOptions<'_>,
     ) -> Result<Replayed> {
         let frame = self.frame_within(trace, samples, seed, options.memory)?;
-        replay(&*self.build(&frame, options.implementation)?, &frame, trace, options)
+        let design = self.build(&frame, options.implementation)?;
+        let mut replayed = replay(&*design, &frame, trace, options)?;
+        if let Some(events) = replayed.events.as_mut().filter(|_| !self.entry.multiplications) {
+            events.multiplications = None;
+        }
+        Ok(replayed)
     }
 
     /// The design as a GPU runs it.

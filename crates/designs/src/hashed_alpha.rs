@@ -11,10 +11,11 @@
 //! `power`). StochasticSplats (Kheradmand et al. 2025; `splat_frag_ST.glsl`), nvpro's
 //! `vk_gaussian_splatting` and Spark 0.1 hash pixel, frame and primitive, each by its own formula;
 //! the first puts pixel and sample into one word and adds the primitive before it hashes, so that
-//! primitive p + 1 has at a pixel the number that p has at the next one to the right; PlayCanvas (pull request 9443) takes a mask of blue noise, moved for each
-//! primitive along its diagonal, to the power of 2.2. In steps of the mask's texels there are
-//! 32 places, so that more than half of all neighbours in the file share theirs and hide each
-//! other; and the power lets an alpha of 0.1 pass a third of the time.
+//! primitive p + 1 has at a pixel the number that p has at the next one to the right; PlayCanvas
+//! (pull request 9443) takes a mask of blue noise, moved for each primitive along its diagonal, to
+//! the power of 2.2. In steps of the mask's texels there are 32 places, so that more than half of
+//! all neighbours in the file share theirs and hide each other; and the power lets an alpha of 0.1
+//! pass a third of the time.
 
 use screendoor_rop::stochastic::{self, Round, Sampler, Stochastic};
 use screendoor_rop::{

@@ -2,7 +2,7 @@
 //! layers are the core, composited in order; all others are the tail, of which a
 //! weighted average is kept (Bavoil, Myers 2008).
 
-use screendoor_rop::layers::{COVERAGE, LAYERS, Layer, Layering, composite, contents};
+use screendoor_rop::layers::{COVERAGE, Columns, LAYERS, Layer, Layering, composite, contents};
 use screendoor_rop::{
     Blueprint, ColourStore, Contents, Family, Frame, Info, Layout, OpaquePromise, OrderPromise,
     OverOpaque, Probe, Promises, Site, Transparent, colour, over_opaque,
@@ -23,6 +23,8 @@ impl Blueprint for Hybrid {
         params: &[over_opaque::PARAM.param, LAYERS.param, COVERAGE.param, colour::PARAM.param],
         combinations: &[],
     };
+
+    const MULTIPLICATIONS: bool = true;
 
     type At<const N: usize> = OverOpaque<HybridAt<N>, N>;
 
@@ -118,6 +120,8 @@ impl<const N: usize> Transparent<N> for HybridAt<N> {
         probe: &mut P,
     ) {
         let layer = self.0.columns.layer(fragment);
+        // What does not fit is added by the share of the samples that it covers.
+        probe.multiplied(Columns::<N>::LAYERED);
         if let Some(furthest) = self.0.insert(&mut pixel.core, layer, probe) {
             let store = self.0.columns.store;
             pixel.tail.add(store, &furthest, self.0.columns.count());

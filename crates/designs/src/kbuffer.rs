@@ -23,6 +23,8 @@ impl Blueprint for KBuffer {
         combinations: &[],
     };
 
+    const MULTIPLICATIONS: bool = true;
+
     type At<const N: usize> = OverOpaque<Bounded<Dropped, N>, N>;
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {

@@ -48,6 +48,8 @@ impl Blueprint for LaineKarras {
         combinations: &COMBINATIONS,
     };
 
+    const MULTIPLICATIONS: bool = true;
+
     type At<const N: usize> = Stochastic<TrackedSampler<Hashed, N>, N>;
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {

@@ -23,6 +23,8 @@ impl Blueprint for Mlab {
         combinations: &[],
     };
 
+    const MULTIPLICATIONS: bool = true;
+
     type At<const N: usize> = OverOpaque<Bounded<Merged, N>, N>;
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
@@ -61,6 +63,7 @@ impl Eviction for Merged {
     ) -> bool {
         if let Some(last) = layers.last_mut() {
             *last = layering.columns.stored(last.merged(&evicted));
+            probe.multiplied(Layer::MERGED);
             // Where all moved, the last was read and is written anyway.
             if evicted == *new {
                 probe.state(layering.bits - 32, layering.bits);

@@ -48,6 +48,8 @@ impl Blueprint for SortedBlend {
 
     const PRIMITIVE_DEPTHS: bool = true;
 
+    const MULTIPLICATIONS: bool = true;
+
     type At<const N: usize> = OverOpaque<SortedBlendAt<N>, N>;
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
@@ -151,6 +153,10 @@ impl<const N: usize> Transparent<N> for SortedBlendAt<N> {
         let Fragment { coverage, colour, alpha, primitive, .. } = *fragment;
         waiting.push(Waiting { key: self.depths.mean(primitive), coverage, colour, alpha });
         BlendBuffer::<N>::tell(coverage, self.store, probe);
+        if self.stop > 0.0 {
+            // How much light is left at each sample.
+            probe.multiplied(coverage.count());
+        }
     }
 
     /// A stable sort: what is equally deep is drawn in API order.

@@ -105,6 +105,8 @@ impl Blueprint for Systematic {
         combinations: &COMBINATIONS,
     };
 
+    const MULTIPLICATIONS: bool = true;
+
     type At<const N: usize> = Stochastic<TrackedSampler<Evenly, N>, N>;
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {

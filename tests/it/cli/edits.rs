@@ -1,5 +1,6 @@
 //! `convert`, `trim`, `join`, `shuffle`, `diff`.
 
+use screendoor::trace::{Compression, Trace};
 use serde_json::Value;
 
 use super::Workplace;
@@ -26,6 +27,34 @@ fn a_trace_is_taken_apart_and_put_together() {
     for trace in ["a.arrow", "c.arrow", "s.arrow"] {
         assert!(place.good(&["verify", trace]).contains("checksums of every byte"));
     }
+}
+
+#[test]
+fn a_packed_trace_stays_packed_unless_another_way_is_named() {
+    let place = Workplace::with_trace();
+    let stored = |trace: &str| Trace::open(place.path(trace)).unwrap().compression().unwrap();
+    assert_eq!(stored("t.arrow"), Compression::None);
+    for (name, way) in [("lz4", Compression::Lz4), ("zstd", Compression::Zstd)] {
+        place.good(&["convert", "t.arrow", "-o", "p.arrow", "--compress", name]);
+        assert_eq!(stored("p.arrow"), way);
+        let verbs: [&[&str]; 4] = [
+            &["trim", "p.arrow", "--samples", "2"],
+            &["join", "p.arrow", "t.arrow"],
+            &["shuffle", "p.arrow"],
+            &["shuffle", "t.arrow", "--compress", name],
+        ];
+        for verb in verbs {
+            place.good(&[verb, &["-o", "q.arrow"]].concat());
+            assert_eq!(stored("q.arrow"), way, "{verb:?}");
+        }
+        for verb in [&["convert", "p.arrow"][..], &["join", "p.arrow", "--compress", "none"]] {
+            place.good(&[verb, &["-o", "q.arrow"]].concat());
+            assert_eq!(stored("q.arrow"), Compression::None, "{verb:?}");
+        }
+    }
+    // Of a trace without a batch nothing is known.
+    place.good(&["trim", "p.arrow", "-o", "q.arrow", "--primitives", "4000000"]);
+    assert_eq!(stored("q.arrow"), Compression::None);
 }
 
 #[test]

@@ -408,16 +408,21 @@ fn what_can_be_found_out_is_before_the_first_run_and_leaves_no_folder() {
         ("camera = 'no.json'", 1, "no.json: No such file"),
         ("camera = 'bad.json'", 1, "bad.json: it is no JSON"),
         ("camera_name = 'b'", 2, "unknown camera 'b'"),
+        ("source = 'a.gltf'\ncamera = 'frnt'", 2, "unknown camera 'frnt'; did you mean 'front'"),
+        ("source = 'a.gltf'\ncamera = '1'", 2, "unknown camera '1'"),
+        ("source = 'surf.obj'\ncamera = 'front'", 2, "the scene's file has none"),
         ("size = [40, 40]", 2, "is one of 24x16 pixels, and not of the shape of 40x40"),
         ("pixel = [24, 0]", 2, "'pixel' cannot be 24, 0"),
     ] {
         let key = more.split(' ').next().unwrap();
         let lines = match key {
+            "source" => more.to_string(),
             "camera" => format!("source = 'surf.obj'\n{more}"),
             _ => format!("{camera}\n{more}"),
         };
         let place = with_camera(&lines);
         fs::write(place.path("bad.json"), "{").unwrap();
+        fs::write(place.path("a.gltf"), OWN_CAMERA).unwrap();
         let (found, error) = place.bad(&["study", "s.toml", "-o", "out"]);
         assert!(found == code && error.contains(says), "{more}: {found}: {error}");
         assert!(error.contains("scene 'ramps'") && !error.contains("--"), "{error}");
@@ -437,6 +442,17 @@ fn what_can_be_found_out_is_before_the_first_run_and_leaves_no_folder() {
         assert!(!output.status.success() && !place.path("out").exists());
     }
 }
+
+/// A triangle in a file that has a camera of its own.
+const OWN_CAMERA: &str = r#"{"asset": {"version": "2.0"},
+"buffers": [{"byteLength": 36, "uri":
+    "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}],
+"bufferViews": [{"buffer": 0, "byteLength": 36}],
+"accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+"meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+"cameras": [{"type": "perspective", "perspective": {"yfov": 1, "znear": 0.1}}],
+"nodes": [{"mesh": 0}, {"camera": 0, "name": "front", "translation": [0, 0, 3]}],
+"scenes": [{"nodes": [0, 1]}], "scene": 0}"#;
 
 /// A camera of 24 x 16 pixels that stands so far before a triangle.
 fn camera(place: &Workplace, distance: f64) {

@@ -88,6 +88,8 @@ impl Blueprint for Enderton {
         combinations: &COMBINATIONS_OF_ENDERTON,
     };
 
+    const MULTIPLICATIONS: bool = true;
+
     type At<const N: usize> = Stochastic<EndertonSampler<N>, N>;
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {

@@ -56,6 +56,8 @@ impl Blueprint for Merging {
         combinations: &["opaque=together,layers=3", "place=heavier,slopes=false,layers=4"],
     };
 
+    const MULTIPLICATIONS: bool = true;
+
     type At<const N: usize> = OverOpaque<MergingAt<N>, N>;
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
@@ -180,6 +182,20 @@ impl<const N: usize> MergingAt<N> {
         place
     }
 
+    /// Multiplications to choose one of so many pairs of neighbours and to merge it: of hardware
+    /// that keeps no costs, which are no state.
+    fn products(&self, pairs: u32) -> u32 {
+        // What shows of the far one through the near one; with a choice, three squares of
+        // opacities' differences, `near·far·gap`, and what is uneven times the range.
+        let of_a_pair = if pairs > 1 { 7 } else { 1 };
+        // What the layers in front let through, but for the first two; squared, and times the
+        // cost.
+        let through = pairs.saturating_sub(2) + 2 * (pairs - 1);
+        // Three colours weighed by two weights; the odds of the random plane.
+        let merging = 6 + u32::from(self.place == Place::Random);
+        of_a_pair * pairs + through + merging
+    }
+
     /// The layers with one more, and with two of them merged where there is no room for it.
     fn insert<P: Probe>(&self, list: &mut Vec<Listed>, sheet: Sheet, word: u32, probe: &mut P) {
         if list.len() < self.room {
@@ -199,6 +215,7 @@ impl<const N: usize> MergingAt<N> {
         list.reserve_exact(1);
         self.put(list, sheet, probe);
         probe.compared(list.len() as u32 - 2);
+        probe.multiplied(self.products(list.len() as u32 - 1));
         let i = Listed::cheapest(list);
         let merged = self.merged(&list[i].sheet, &list[i + 1].sheet, word);
         list.remove(i + 1);

@@ -203,6 +203,15 @@ impl Store {
         place
     }
 
+    /// Multiplications of [`Store::attenuate`] where so many entries lie in front of a fragment
+    /// and behind it: with `T`, of the mass and the sums of each that lies behind, and for what
+    /// shows wrongly with the coverage in front, which is multiplied first.
+    pub(super) fn attenuating(&self, drawn: &Drawn, [front, behind]: [usize; 2]) -> u32 {
+        let parts = if self.parts == 1 { 1 } else { drawn.coverage.count() };
+        let for_own = u32::from(front > 0);
+        behind as u32 + 4 * parts * (for_own + behind as u32)
+    }
+
     /// The entry nearest to a stored depth, the nearer one of two as near.
     pub(super) fn nearest(&self, entries: &[Entry], z: u32) -> usize {
         let distance = |i: &usize| entries[*i].z.abs_diff(z);
@@ -226,7 +235,10 @@ impl Store {
             (u64::from(reduced) * u64::from(far.z - near.z)) >> 16
         };
         // The least of the neighbours' costs.
-        probe.compared(entries.len() as u32 - 2);
+        let pairs = entries.len() as u32 - 1;
+        probe.compared(pairs - 1);
+        // Two masses and the distance, where there is a choice; the centre of mass.
+        probe.multiplied(if pairs > 1 { 2 * pairs } else { 0 } + 1);
         let least = (0..entries.len() - 1).min_by_key(cost).expect("there are two");
         let far = entries.remove(least + 1);
         let near = &mut entries[least];

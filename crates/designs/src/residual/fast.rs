@@ -171,9 +171,10 @@ where
         let attenuation = of_pixel(threshold, coverage.count_ones(), N.ilog2());
         let mass = mass_of(attenuation);
         let own = [z, mass];
+        let behind = kept.z >= z;
         if !kept.begun {
             [kept.z, kept.mass] = own;
-        } else if kept.z < z {
+        } else if !behind {
             let hidden = share(attenuation, kept.sums[3]);
             for (sum, x) in kept.sums.iter_mut().zip(drawn) {
                 *sum = sum.saturating_add(shown(hidden, x).saturating_neg());
@@ -190,6 +191,10 @@ where
         }
 
         tally.compared(u32::from(kept.begun));
+        // As the plain text's: an error behind has a mass, too; both have a centre of mass.
+        let attenuating = if behind { 4 + 1 } else { 4 };
+        let made = if kept.begun { attenuating + 1 } else { 0 };
+        tally.multiplied(made + if passed == 0 { 0 } else { 4 });
         tally.colours_read(gone[0] as u32);
         tally.tracked(true);
         tally.hashed(1);

@@ -86,6 +86,8 @@ impl Blueprint for Residual {
         ],
     };
 
+    const MULTIPLICATIONS: bool = true;
+
     type At<const N: usize> = Stochastic<ResidualSampler<N>, N>;
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
@@ -282,6 +284,10 @@ impl<const N: usize> ResidualSampler<N> {
         #[cfg(test)]
         let drawn = &self.flawed(drawn, passed);
         probe.remark(|| self.attenuation(errors, drawn));
+        if P::LISTENS {
+            let front = errors.iter().filter(|entry| entry.z < drawn.z).count();
+            probe.multiplied(self.store.attenuating(drawn, [front, errors.len() - front]));
+        }
         let own = self.store.attenuate(errors, drawn);
         let own = self.store.make_room(errors, own, probe);
         probe.remark(|| {
@@ -304,11 +310,13 @@ impl<const N: usize> ResidualSampler<N> {
             for (part, sums) in entry.parts.iter_mut().enumerate() {
                 // What comes, less what goes, if all that passed were written, and what is.
                 let mut changes = [[0; 2]; 4];
+                let mut changed = false;
                 let samples_of_part = match self.store.parts {
                     1 => passed,
                     _ => passed & SampleMask(1 << part),
                 };
                 for s in samples_of_part.iter() {
+                    changed |= place == own || place == nearest[s];
                     let write = i32::from(written.contains(s));
                     let mut change = |colour: Sums, sign: i32| {
                         for (change, x) in changes.iter_mut().zip(colour) {
@@ -326,6 +334,7 @@ impl<const N: usize> ResidualSampler<N> {
                 for (sum, change) in sums.iter_mut().zip(changes) {
                     self.store.innovate(sum, drawn.threshold, change);
                 }
+                probe.multiplied(if changed { 4 } else { 0 });
             }
         }
         self.store.round(errors, drawn.random);

@@ -33,6 +33,11 @@ pub static DERIVED: &[Derived] = &[
         unit: "comparisons per fragment",
         of: |r| Tree::of(&r.comparators_per_fragment()),
     },
+    Derived {
+        name: "multiplications_per_fragment",
+        unit: "products per fragment",
+        of: |r| Tree::of(&r.multiplications_per_fragment()),
+    },
     Derived { name: "tied_share", unit: "0 to 1", of: |r| Tree::of(&r.tied_share()) },
     Derived { name: "unbiased_here", unit: "", of: |r| Tree::of(&r.kept().unbiased) },
     Derived { name: "nanoseconds_per_fragment", unit: "ns per fragment", of: nanoseconds },

@@ -51,6 +51,7 @@ const COLUMNS: &[(&str, Figure)] = &[
     ("moved, bytes/fragment", |r| r.bytes_moved_per_fragment().map(figures)),
     ("hashes/fragment", |r| r.hashes_per_fragment().map(figures)),
     ("comparators/fragment", |r| r.comparators_per_fragment().map(figures)),
+    ("products/fragment", |r| r.multiplications_per_fragment().map(figures)),
 ];
 
 fn table(results: &Results, scene: &str, samples: u32) -> Section {

@@ -160,8 +160,9 @@ fn costs(results: &Results) -> Section {
     let mut part = Section::new(format!("State and events, {SHOWN} samples"));
     part.paragraph(
         "State per pixel as hardware holds it, and by layout in bits; per fragment, the mean over the \
-         scenes: hashes, comparators (depth tests, sorting networks, layers compared) and bytes of state \
-         read and written. Multiplications are no event: the designs' own pages count them. How fast the \
+         scenes: hashes, comparators (depth tests, sorting networks, layers compared), \
+         multiplications (of colours, opacities and errors while fragments are drawn; none of a design \
+         for which that would be no honest count) and bytes of state read and written. How fast the \
          designs are replayed is in [PERFORMANCE.md](PERFORMANCE.md).",
     );
     let row = |series: &String| {
@@ -179,10 +180,11 @@ fn costs(results: &Results) -> Section {
             records.first().map_or(String::new(), |r| r.layout.clone()),
             mean(&Record::hashes_per_fragment),
             mean(&Record::comparators_per_fragment),
+            mean(&Record::multiplications_per_fragment),
             mean(&Record::bytes_moved_per_fragment),
         ]
     };
-    let header = ["design", "bytes", "layout", "hashes", "comparators", "bytes moved"];
+    let header = ["design", "bytes", "layout", "hashes", "comparators", "products", "bytes moved"];
     part.table(header, results.study.designs.iter().map(row));
     part
 }

@@ -32,12 +32,14 @@ impl<const N: usize> BlendBuffer<N> {
     }
 
     /// Tells `probe` what blending a fragment costs: each sample's colour is read and
-    /// written.
+    /// written, and each of its channels multiplied with the fragment's alpha: it moves by α of what
+    /// it lacks.
     #[inline]
     pub fn tell<P: Probe>(covered: SampleMask, store: ColourStore, probe: &mut P) {
         probe.written(covered);
         let bits = store.colour_bits() * covered.count();
         probe.state(bits, bits);
+        probe.multiplied(3 * covered.count());
     }
 
     /// `C ← αc + (1 − α)C` at each covered sample, stored each time.

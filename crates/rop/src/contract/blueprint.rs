@@ -27,6 +27,11 @@ pub trait Blueprint: 'static {
     /// blocks that they draw, nor to a device, and have their defaults in its fragments.
     const COLUMNS: ColumnSet = ColumnSet::NONE;
 
+    /// Whether it tells its multiplications, whatever its parameters: a design of which
+    /// [`EventCounts::multiplications`](crate::EventCounts) would not be an honest count leaves
+    /// them out.
+    const MULTIPLICATIONS: bool = false;
+
     /// The design for pixels of `N` samples.
     type At<const N: usize>: Design;
 

@@ -41,6 +41,9 @@ pub enum Event<'a> {
     /// So many comparisons were made to place, choose or remove stored layers; what
     /// counts as one is said at [`EventCounts::comparators`].
     Compared(u32),
+    /// So many multiplications were made of what fragments and pixels hold; what counts as
+    /// one is said at [`EventCounts::multiplications`].
+    Multiplied(u32),
     /// Bits of the pixel's state were read and written.
     State {
         /// Bits read.
@@ -79,7 +82,8 @@ impl fmt::Debug for Remark<'_> {
 ///             Event::Hashed(count) => self.0 += count,
 ///             Event::Fragment(_) | Event::DepthTest { .. } | Event::Surface(_) => {}
 ///             Event::Sorted(_) | Event::Reference { .. } | Event::Written(_) => {}
-///             Event::Compared(_) | Event::State { .. } | Event::Remark(_) => {}
+///             Event::Compared(_) | Event::Multiplied(_) => {}
+///             Event::State { .. } | Event::Remark(_) => {}
 ///         }
 ///     }
 /// }
@@ -104,7 +108,7 @@ impl fmt::Debug for Remark<'_> {
 ///             Event::Fragment(_) | Event::DepthTest { .. } | Event::Surface(_) => {}
 ///             Event::Sorted(_) | Event::Reference { .. } | Event::Written(_) => {}
 ///             // Nothing about `Event::Compared`.
-///             Event::State { .. } | Event::Remark(_) => {}
+///             Event::Multiplied(_) | Event::State { .. } | Event::Remark(_) => {}
 ///         }
 ///     }
 /// }
@@ -183,6 +187,11 @@ pub trait Probe: Listen {
     fn compared(&mut self, count: u32) {
         self.event(Event::Compared(count));
     }
+    /// [`Event::Multiplied`].
+    #[inline(always)]
+    fn multiplied(&mut self, count: u32) {
+        self.event(Event::Multiplied(count));
+    }
     /// [`Event::State`].
     #[inline(always)]
     fn state(&mut self, read: u32, written: u32) {
@@ -240,6 +249,23 @@ pub struct EventCounts {
     /// Comparisons that placed, chose or removed stored layers, as
     /// [`EventCounts::comparators`] says.
     pub layers_compared: u64,
+    /// Multiplications of colours, opacities and errors while fragments are drawn; `None` of
+    /// a design that does not say ([`Blueprint::MULTIPLICATIONS`](crate::Blueprint)).
+    ///
+    /// They are counted as hardware needs them, of two numbers that vary:
+    ///
+    /// - one for each channel that an opacity, a transmittance or an error is multiplied with;
+    /// - none with a number of samples or layers, a fraction of two such, or a constant, which
+    ///   are additions, shifts and tables; none within a hash; none that gives a plane's depth
+    ///   at a sample, which all designs need alike; and no division;
+    /// - none by what is known to be nought or one before it is multiplied: where a sample is
+    ///   not covered or lets nothing pass, or no layer lies in front;
+    /// - none that is made once a pixel, at the end of a pass or to resolve it, as of state.
+    ///
+    /// A design that works out its colours at the end of a pass, or takes logarithms, powers or
+    /// roots for a fragment, would look cheap by that, and does not say.
+    #[serde(default)]
+    pub multiplications: Option<u64>,
     /// Bits of pixel state read.
     pub state_bits_read: u64,
     /// Bits of pixel state written.
@@ -257,6 +283,7 @@ impl Default for EventCounts {
             sorts_by_length: vec![0; MAX_SAMPLES as usize + 1],
             surfaces: 0,
             layers_compared: 0,
+            multiplications: Some(0),
             state_bits_read: 0,
             state_bits_written: 0,
         }
@@ -313,6 +340,7 @@ impl EventCounts {
             sorts_by_length,
             surfaces,
             layers_compared,
+            multiplications,
             state_bits_read,
             state_bits_written,
         } = other;
@@ -326,6 +354,8 @@ impl EventCounts {
         }
         self.surfaces += surfaces;
         self.layers_compared += layers_compared;
+        self.multiplications =
+            self.multiplications.zip(*multiplications).map(|(own, other)| own + other);
         self.state_bits_read += state_bits_read;
         self.state_bits_written += state_bits_written;
     }
@@ -371,6 +401,9 @@ impl Listen for EventCounts {
             Event::Hashed(count) => self.hashes += u64::from(count),
             Event::Written(samples) => self.samples_written += u64::from(samples.count()),
             Event::Compared(count) => self.layers_compared += u64::from(count),
+            Event::Multiplied(count) => {
+                self.multiplications = self.multiplications.map(|n| n + u64::from(count));
+            }
             Event::State { read, written } => {
                 self.state_bits_read += u64::from(read);
                 self.state_bits_written += u64::from(written);
@@ -409,6 +442,8 @@ pub struct Record {
     pub hashes: u32,
     /// Comparisons that placed, chose or removed stored layers.
     pub layers_compared: u32,
+    /// Multiplications; 0 of a design that does not say.
+    pub multiplications: u32,
     /// Bits of pixel state read.
     pub state_bits_read: u32,
     /// Bits of pixel state written.
@@ -464,6 +499,7 @@ impl Listen for Record {
             Event::Hashed(count) => self.hashes += count,
             Event::Written(samples) => self.written |= samples,
             Event::Compared(count) => self.layers_compared += count,
+            Event::Multiplied(count) => self.multiplications += count,
             Event::State { read, written } => {
                 self.state_bits_read += read;
                 self.state_bits_written += written;

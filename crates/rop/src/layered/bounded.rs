@@ -13,7 +13,7 @@ use crate::contract::frame::{Frame, Site};
 use crate::contract::layout::Layout;
 use crate::contract::over_opaque::{self, OverOpaque, Transparent};
 use crate::contract::words::{Declaration, OnDevice, PixelWords};
-use crate::layered::layers::{Layer, Layering, contents};
+use crate::layered::layers::{Columns, Layer, Layering, contents};
 
 /// What becomes of the furthest of one layer too many.
 pub trait Eviction: Clone + Copy + Debug + Send + Sync + 'static {
@@ -64,6 +64,7 @@ impl<E: Eviction, const N: usize> Transparent<N> for Bounded<E, N> {
         probe: &mut P,
     ) {
         let layer = self.layering.columns.layer(fragment);
+        probe.multiplied(Columns::<N>::LAYERED);
         let written = match self.layering.insert(layers, layer, probe) {
             Some(evicted) => E::evict(&self.layering, layers, &layer, evicted, probe),
             None => true,

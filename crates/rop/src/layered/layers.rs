@@ -83,6 +83,9 @@ impl<const N: usize> Columns<N> {
         }
     }
 
+    /// Multiplications of [`Columns::layer`]: the colour with its alpha.
+    pub const LAYERED: u32 = 3;
+
     /// A fragment as a layer.
     #[inline]
     pub fn layer(self, fragment: &Fragment) -> Layer {
@@ -174,6 +177,10 @@ impl Layer {
         let z = f64::from(self.depth.0) / f64::from(u32::MAX);
         format!("z {z:.6} rgb {colour} t {:.3} in {:#x}", self.transmittance, self.coverage.0)
     }
+
+    /// Multiplications of [`Layer::merged`]: the colour and the transmittance of the one behind
+    /// with that of the one in front. What samples they share is a fraction of numbers of samples.
+    pub const MERGED: u32 = 4;
 
     /// This layer and one behind it as one, at this one's depth (Salvi and
     /// Vaidyanathan 2014: `rgb = s.rgb + d.rgb s.t`, `t = s.t d.t`). Where they do

@@ -9,12 +9,15 @@ use crate::scene::{
 };
 use screendoor_trace::error::Result;
 
+/// What reads a format.
+type Load = fn(&Path, &Folder, &LoadOptions) -> Result<Scene>;
+
 /// A format by one of its endings.
 pub(super) struct Format {
     /// How files' names end, in small letters.
     pub(super) ending: &'static str,
     pub(super) up: Up,
-    pub(super) load: fn(&Path, &Folder, &LoadOptions) -> Result<Scene>,
+    pub(super) load: Load,
 }
 
 /// Whether it is known which way is up in a file.
@@ -27,8 +30,6 @@ pub(super) enum Up {
     /// Files do not keep to the format's text, which is told where nobody says another way.
     Guessed(&'static str),
 }
-
-type Load = fn(&Path, &Folder, &LoadOptions) -> Result<Scene>;
 
 const fn format(ending: &'static str, up: Up, load: Load) -> Format {
     Format { ending, up, load }

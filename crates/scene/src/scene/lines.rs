@@ -25,17 +25,25 @@ impl Strands {
         self.colours.extend(colours);
         self.starts.push(self.points.len() as u32);
     }
+
+    /// Whether these are lines that have no width yet.
+    fn lack_width(&self) -> bool {
+        self.radii.is_empty() && !self.points.is_empty()
+    }
+}
+
+/// The lines of a shape, where it is made of lines that have no width yet.
+fn lines_of(shape: &Shape) -> Option<&Strands> {
+    match shape {
+        Shape::Strands(strands) if strands.lack_width() => Some(strands),
+        _ => None,
+    }
 }
 
 impl Scene {
     /// The lines of an object, where it is made of lines that have no width yet.
     fn lines(&self, object: &Object) -> Option<&Strands> {
-        match &self.shapes[object.shape] {
-            Shape::Strands(strands) if strands.radii.is_empty() && !strands.points.is_empty() => {
-                Some(strands)
-            }
-            _ => None,
-        }
+        lines_of(&self.shapes[object.shape])
     }
 
     /// Gives lines their width in the scene's units, or where none is given a share of their
@@ -103,21 +111,17 @@ impl Scene {
         let kept: Vec<bool> = self.objects.iter().map(|o| self.lines(o).is_none()).collect();
         let mut kept = kept.into_iter();
         self.objects.retain(|_| kept.next().unwrap_or(true));
-        let is_line = |shape: &Shape| match shape {
-            Shape::Strands(strands) => strands.radii.is_empty() && !strands.points.is_empty(),
-            _ => false,
-        };
         let mut next = 0;
         let numbers: Vec<usize> = self
             .shapes
             .iter()
             .map(|shape| {
                 let number = next;
-                next += usize::from(!is_line(shape));
+                next += usize::from(lines_of(shape).is_none());
                 number
             })
             .collect();
-        self.shapes.retain(|shape| !is_line(shape));
+        self.shapes.retain(|shape| lines_of(shape).is_none());
         self.objects.iter_mut().for_each(|object| object.shape = numbers[object.shape]);
     }
 

@@ -263,6 +263,12 @@ impl Record {
         self.per_fragment(self.events.comparators() as f64)
     }
 
+    /// Multiplications for each fragment of the trace ([`EventCounts::multiplications`]); `None`
+    /// too of a design that does not say.
+    pub fn multiplications_per_fragment(&self) -> Option<f64> {
+        self.per_fragment(self.events.multiplications? as f64)
+    }
+
     /// An engine's nanoseconds for each fragment of the trace.
     pub fn nanoseconds_per_fragment(&self, engine: &str) -> Option<Spread> {
         let seconds = self.speed.get(engine)?.seconds?;

@@ -1,12 +1,13 @@
 //! The same fragments, stored otherwise.
 
+use std::cell::Cell;
 use std::collections::BTreeMap;
 
 use half::f16;
 
 use crate::edit::{Edit, Progress, Push, each_row};
 use crate::error::{Error, Result};
-use crate::trace::{ColourFormat, ColumnId, Header, Scalar, Trace};
+use crate::trace::{ColourFormat, ColumnId, Fragment, Header, Scalar, Trace};
 
 crate::options! {
     /// Which columns are stated in the header instead of being stored.
@@ -39,6 +40,8 @@ impl Default for ConvertOptions {
 pub struct Convert<'a> {
     trace: &'a Trace,
     header: Header,
+    /// Counted as fragments are handed out, which a pass for it alone would read once more.
+    rounded: Cell<u64>,
 }
 
 /// The columns of colours.
@@ -66,40 +69,27 @@ impl<'a> Convert<'a> {
         if header.colour == ColourFormat::F32 && !COLOURS.iter().any(|id| header.stores(*id)) {
             header.constants.remove(&ColumnId::R);
         }
-        Ok(Convert { trace, header })
+        Ok(Convert { trace, header, rounded: Cell::new(0) })
     }
 
-    /// How many fragments have colours that lose something in the new trace's precision.
+    /// Whether a fragment's colours lose something in the new trace's precision.
     ///
     /// # Errors
-    /// Those of reading the trace; [`Error::Unsupported`] for a colour that half precision
-    /// cannot hold.
-    pub fn rounded(&self, progress: Progress<'_>) -> Result<u64> {
-        let stored = COLOURS.map(|id| self.header.stores(id));
-        let old = self.trace.header();
-        // What was stored as halves already loses nothing.
-        let may = old.colour == ColourFormat::F32 || stores_what_halves_lack(old, &self.header);
-        if self.header.colour == ColourFormat::F32 || !may {
-            return Ok(0);
-        }
-        let mut rounded = 0;
-        each_row(self.trace, (0, self.trace.rows()), progress, |row, fragment| {
-            let colours = stored.into_iter().zip(fragment.colour).filter(|(stored, _)| *stored);
-            let mut loses = false;
-            for (_, value) in colours {
-                if f16::from_f32(value).is_infinite() {
-                    return Err(Error::unsupported(
-                        format_args!("{}, row {row}", self.trace.place()),
-                        format_args!("its colour {value} is beyond 65504, half precision's most"),
-                        "keep colours in single precision",
-                    ));
-                }
-                loses |= !is_half(value);
+    /// [`Error::Unsupported`] for a colour that half precision cannot hold.
+    fn rounds(&self, row: u64, fragment: &Fragment, stored: [bool; 3]) -> Result<bool> {
+        let colours = stored.into_iter().zip(fragment.colour).filter(|(stored, _)| *stored);
+        let mut loses = false;
+        for (_, value) in colours {
+            if f16::from_f32(value).is_infinite() {
+                return Err(Error::unsupported(
+                    format_args!("{}, row {row}", self.trace.place()),
+                    format_args!("its colour {value} is beyond 65504, half precision's most"),
+                    "keep colours in single precision",
+                ));
             }
-            rounded += u64::from(loses);
-            Ok(())
-        })?;
-        Ok(rounded)
+            loses |= !is_half(value);
+        }
+        Ok(loses)
     }
 }
 
@@ -109,7 +99,22 @@ impl Edit for Convert<'_> {
     }
 
     fn fragments(&self, push: Push<'_>, progress: Progress<'_>) -> Result<()> {
-        each_row(self.trace, (0, self.trace.rows()), progress, |_, fragment| push(&fragment))
+        let old = self.trace.header();
+        // What was stored as halves already loses nothing.
+        let may = old.colour == ColourFormat::F32 || stores_what_halves_lack(old, &self.header);
+        let may = may && self.header.colour == ColourFormat::F16;
+        let stored = COLOURS.map(|id| may && self.header.stores(id));
+        let mut rounded = 0;
+        each_row(self.trace, (0, self.trace.rows()), progress, |row, fragment| {
+            rounded += u64::from(self.rounds(row, &fragment, stored)?);
+            push(&fragment)
+        })?;
+        self.rounded.set(rounded);
+        Ok(())
+    }
+
+    fn rounded(&self) -> u64 {
+        self.rounded.get()
     }
 }
 

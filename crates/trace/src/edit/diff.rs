@@ -5,9 +5,7 @@ use serde::Serialize;
 use crate::edit::Progress;
 use crate::error::Result;
 use crate::param::Options;
-use crate::trace::{
-    Batch, ColourFormat, ColumnId, ColumnKind, Fragment, Header, Scalar, Trace, View,
-};
+use crate::trace::{ColourFormat, ColumnId, ColumnKind, Fragment, Header, Scalar, Trace, View};
 
 /// What two traces have in common: as little as the worst of their pixels.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug, Serialize)]
@@ -168,26 +166,22 @@ pub fn difference(traces: [&Trace; 2], memory: u64, progress: Progress<'_>) -> R
         pixels: 0,
         reordered: 0,
         counts: 0,
-        row: first_row(traces)?,
+        row: None,
         first: None,
         columns: Vec::new(),
         compared: 0,
     };
-    // Whether the traces have the same rows is known; which pixels differ is not.
-    if found.row.is_none() {
-        return Ok(found);
-    }
-    found.same = Kept::Pixels;
     let mut chosen: Vec<u64> = Vec::new();
     let mut first = None;
     let (mut held, mut fragments) = (0_u64, 0);
     for (i, (top, bottom)) in bands.iter().copied().enumerate() {
         let mut seen = vec![[Seen::default(); 2]; (u64::from(bottom - top) * width) as usize];
-        for (side, trace) in traces.into_iter().enumerate() {
-            for batch in trace.batches() {
-                note(&batch?, (top, bottom), width, side, &mut seen);
-            }
+        found.row = note(traces, (top, bottom), width, &mut seen)?;
+        // Then no pixel differs either, in whatever part of the frame.
+        if found.row.is_none() {
+            return Ok(found);
         }
+        found.same = found.same.max(Kept::Pixels);
         for (pixel, [a, b]) in seen.iter().enumerate() {
             if (a.fragments, a.ordered) == (b.fragments, b.ordered) {
                 continue;
@@ -214,19 +208,6 @@ pub fn difference(traces: [&Trace; 2], memory: u64, progress: Progress<'_>) -> R
     Ok(found)
 }
 
-/// The first row in which two traces differ, or which one of them lacks.
-fn first_row(traces: [&Trace; 2]) -> Result<Option<u64>> {
-    let [mut a, mut b] = traces.map(rows);
-    for row in 0.. {
-        match (a.next().transpose()?, b.next().transpose()?) {
-            (None, None) => break,
-            (Some(a), Some(b)) if same(&a, &b) => {}
-            _ => return Ok(Some(row)),
-        }
-    }
-    Ok(None)
-}
-
 /// All fragments of a trace.
 fn rows(trace: &Trace) -> impl Iterator<Item = Result<Fragment>> + '_ {
     trace.batches().flat_map(|batch| {
@@ -245,22 +226,42 @@ fn same(a: &Fragment, b: &Fragment) -> bool {
     ColumnId::ALL.into_iter().all(|id| a.value(id).is(b.value(id)))
 }
 
-/// Takes down a batch's fragments in rows of pixels from `top` to before `bottom`, as those
-/// of one side.
-fn note(batch: &Batch, (top, bottom): (u32, u32), width: u64, side: usize, seen: &mut [[Seen; 2]]) {
-    for i in 0..batch.len() {
-        let (x, y) = batch.pixel(i);
-        let y = u32::from(y);
-        if !(top..bottom).contains(&y) {
-            continue;
+/// Takes down the fragments in rows of pixels from `top` to before `bottom`. Tells the first row
+/// of the traces that differs, or which one of them lacks.
+fn note(
+    traces: [&Trace; 2],
+    (top, bottom): (u32, u32),
+    width: u64,
+    seen: &mut [[Seen; 2]],
+) -> Result<Option<u64>> {
+    let [mut a, mut b] = traces.map(rows);
+    let mut first = None;
+    for row in 0.. {
+        let sides = [a.next().transpose()?, b.next().transpose()?];
+        let known = first.is_some();
+        match &sides {
+            [None, None] => break,
+            [Some(a), Some(b)] if known || same(a, b) => {}
+            _ => first = first.or(Some(row)),
         }
-        let hash = hash(&batch.fragment(i));
-        let pixel = (u64::from(y - top) * width) as usize + usize::from(x);
-        let pixel = &mut seen[pixel][side];
-        pixel.fragments += 1;
-        pixel.ordered = scramble(pixel.ordered ^ hash);
-        pixel.sum = pixel.sum.wrapping_add(hash);
+        for (side, fragment) in sides.iter().enumerate() {
+            let Some(fragment) = fragment else { continue };
+            let y = u32::from(fragment.y);
+            if !(top..bottom).contains(&y) {
+                continue;
+            }
+            let pixel = (u64::from(y - top) * width) as usize + usize::from(fragment.x);
+            let pixel = &mut seen[pixel][side];
+            pixel.fragments += 1;
+            // What both begin with tells nothing apart.
+            if first.is_some() {
+                let hash = hash(fragment);
+                pixel.ordered = scramble(pixel.ordered ^ hash);
+                pixel.sum = pixel.sum.wrapping_add(hash);
+            }
+        }
     }
+    Ok(first)
 }
 
 fn hash(fragment: &Fragment) -> u64 {

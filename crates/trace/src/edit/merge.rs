@@ -1,7 +1,7 @@
 //! Several traces as one.
 
 use crate::edit::convert::stores_what_halves_lack;
-use crate::edit::{Edit, Progress, Push, each_row};
+use crate::edit::{Edit, Progress, Push, each_row, header_differences};
 use crate::error::{Error, Result};
 use crate::trace::{ColourFormat, ColumnId, Header, Trace};
 
@@ -13,6 +13,9 @@ pub struct MergeOptions {
     /// primitives must have different numbers.
     pub keep_numbers: bool,
 }
+
+/// The entries of headers in which traces of one frame are alike.
+const ONE: [&str; 4] = ["frame", "samples", "background", "space"];
 
 /// Several traces of one frame as one: the fragments of the first, then those of the second,
 /// and so on.
@@ -35,20 +38,13 @@ impl<'a> Merge<'a> {
         };
         let mut header = first.header().clone();
         for trace in others {
-            let (one, other) = (first.header(), trace.header());
-            let differs = [
-                ("frame", one.width != other.width || one.height != other.height),
-                ("samples", one.pattern.positions != other.pattern.positions),
-                (
-                    "background",
-                    one.background.map(f32::to_bits) != other.background.map(f32::to_bits),
-                ),
-                ("space of colours", one.space != other.space),
-            ];
-            if let Some((what, _)) = differs.into_iter().find(|(_, differs)| *differs) {
+            let other = trace.header();
+            let differences = header_differences(first.header(), other);
+            if let Some(found) = differences.iter().find(|found| ONE.contains(&found.entry)) {
+                let what = found.entry;
                 return Err(Error::config(
                     format_args!("{} and {} differ in their {what}", first.place(), trace.place()),
-                    "join traces of one frame, its samples, its background and its space",
+                    "join traces of one frame, its samples, its background and its space of colours",
                 ));
             }
             header.pattern.nested &= other.pattern.nested;

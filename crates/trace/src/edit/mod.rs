@@ -40,6 +40,12 @@ pub trait Edit {
     /// # Errors
     /// Those of reading the traces, and those of `push`.
     fn fragments(&self, push: Push<'_>, progress: Progress<'_>) -> Result<()>;
+
+    /// How many of the fragments that were handed out last have colours that lose something in
+    /// the new trace's precision, where the edit changes that.
+    fn rounded(&self) -> u64 {
+        0
+    }
 }
 
 /// Hands the fragments of an edit to the writer of a trace with [`Edit::header`].

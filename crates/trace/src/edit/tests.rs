@@ -81,7 +81,7 @@ fn a_conversion_without_a_change_has_the_same_content() {
     let trace = trace(&header, &made_up(&header, 1000));
     let convert = Convert::new(&trace, ConvertOptions::default(), &mut |_, _| ()).unwrap();
     assert_eq!(made(&convert).content(), trace.content());
-    assert_eq!(convert.rounded(&mut |_, _| ()).unwrap(), 0);
+    assert_eq!(convert.rounded(), 0);
 }
 
 #[test]
@@ -149,13 +149,13 @@ fn rounded_colours_are_counted_and_stated_ones_are_not_rounded() {
     let trace = trace(&wide, &colours);
     let options = ConvertOptions { colour: Some(ColourFormat::F16), ..ConvertOptions::default() };
     let convert = Convert::new(&trace, options, &mut |_, _| ()).unwrap();
-    assert_eq!(convert.rounded(&mut |_, _| ()).unwrap(), 2);
     assert_eq!(fragments(&made(&convert))[0].colour[0], half::f16::from_f32(0.1).to_f32());
+    assert_eq!(convert.rounded(), 2);
 
     // What halves cannot hold at all is told with its row.
     let bright = self::trace(&wide, &[fragment, Fragment { colour: [7e4; 3], ..fragment }]);
     let error = Convert::new(&bright, options, &mut |_, _| ()).unwrap();
-    let error = error.rounded(&mut |_, _| ()).unwrap_err().to_string();
+    let error = error.fragments(&mut |_| Ok(()), &mut |_, _| ()).unwrap_err().to_string();
     assert!(error.contains("test, row 1") && error.contains("beyond 65504"), "{error}");
 
     // 0.1 is stated beside stored halves, and would be rounded if it were stored as one.
@@ -170,7 +170,8 @@ fn rounded_colours_are_counted_and_stated_ones_are_not_rounded() {
     let colour = Some(ColourFormat::F16);
     let options = ConvertOptions { colour, constants: Constants::Store };
     let convert = Convert::new(&stated, options, &mut |_, _| ()).unwrap();
-    assert_eq!(convert.rounded(&mut |_, _| ()).unwrap(), 1);
+    made(&convert);
+    assert_eq!(convert.rounded(), 1);
     let plain = self::trace(
         &Header { constants: [].into(), ..narrow },
         &[Fragment { colour: [0.5; 3], ..fragment }],

@@ -223,7 +223,7 @@ fn key_values<'a>(
 pub(crate) struct BatchLayout {
     pub rows: usize,
     columns: Vec<(StoredColumn, Range<usize>)>,
-    compression: Option<CompressionType>,
+    pub compression: Option<CompressionType>,
 }
 
 impl BatchLayout {

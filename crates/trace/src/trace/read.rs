@@ -13,6 +13,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::error::{Error, Result};
+use crate::param::Options;
 use crate::trace::batch::Batch;
 use crate::trace::cells::Source;
 use crate::trace::column::ValueType;
@@ -23,6 +24,7 @@ use crate::trace::layout::{BatchLayout, Block, Layout};
 use crate::trace::seal::{CHECKSUMS, CHECKSUMS_KIND, Seal, damaged};
 use crate::trace::stored::StoredColumns;
 use crate::trace::stored_file::{self, StoredFile};
+use crate::trace::write::Compression;
 
 /// A trace that is open for reading. Cloning shares it.
 ///
@@ -307,22 +309,11 @@ impl Trace {
     /// file once decompressed.
     fn read_batch(&self, i: usize, mut stored: impl FnMut(ColumnId, &[u8])) -> Result<Batch> {
         let inner = &*self.inner;
-        let block = &inner.blocks[i];
-        let place = batch_place(&inner.place, i, block);
-        let bytes = inner.storage.bytes(&inner.place, block.offset, block.bytes())?;
-        match &inner.seal {
-            Some(seal) => check_crc(&bytes, seal.blocks[i + 1].crc, &place)
-                .map_err(|damage| inner.storage.changed(&inner.place).unwrap_or(damage))?,
-            // Nothing else would tell.
-            None => inner.storage.changed(&inner.place).map_or(Ok(()), Err)?,
-        }
-        let layout = BatchLayout::parse(&bytes, block, &inner.stored, &place)?;
-        if layout.rows as u64 != inner.block_rows[i] {
-            return Err(damaged(&place, "its row count differs from the seal's"));
-        }
+        let (layout, bytes, place) = self.stored_batch(i)?;
+        let message_bytes = inner.blocks[i].message_bytes;
         let bytes = Buffer::from(bytes);
         let batch = Batch::assemble(layout.rows, |id| {
-            let values = layout.values(id, &bytes, block.message_bytes, &place)?;
+            let values = layout.values(id, &bytes, message_bytes, &place)?;
             let read = inner.columns.iter().find(|(column, _)| *column == id);
             Ok(match values.zip(read) {
                 Some(((column, values), (_, value_type))) => {
@@ -336,6 +327,39 @@ impl Trace {
         })?;
         batch.check(&inner.header, &place)?;
         Ok(batch)
+    }
+
+    /// Batch `i` as it is in the file, its checksum and structure checked: what its message says,
+    /// its bytes, and where it is.
+    fn stored_batch(&self, i: usize) -> Result<(BatchLayout, Bytes, String)> {
+        let inner = &*self.inner;
+        let block = &inner.blocks[i];
+        let place = batch_place(&inner.place, i, block);
+        let bytes = inner.storage.bytes(&inner.place, block.offset, block.bytes())?;
+        match &inner.seal {
+            Some(seal) => check_crc(&bytes, seal.blocks[i + 1].crc, &place)
+                .map_err(|damage| inner.storage.changed(&inner.place).unwrap_or(damage))?,
+            // Nothing else would tell.
+            None => inner.storage.changed(&inner.place).map_or(Ok(()), Err)?,
+        }
+        let layout = BatchLayout::parse(&bytes, block, &inner.stored, &place)?;
+        if layout.rows as u64 != inner.block_rows[i] {
+            return Err(damaged(&place, "its row count differs from the seal's"));
+        }
+        Ok((layout, bytes, place))
+    }
+
+    /// How its columns are stored: as those of its first batch are.
+    ///
+    /// # Errors
+    /// As [`Trace::batch`].
+    pub fn compression(&self) -> Result<Compression> {
+        if self.batch_count() == 0 {
+            return Ok(Compression::None);
+        }
+        let codec = self.stored_batch(0)?.0.compression;
+        let known = Compression::ALL.iter().copied().find(|known| known.codec() == codec);
+        Ok(known.unwrap_or(Compression::None))
     }
 
     /// All batches in order.

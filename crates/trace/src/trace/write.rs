@@ -25,6 +25,17 @@ crate::options! {
     }
 }
 
+impl Compression {
+    /// What files call it.
+    pub(super) fn codec(self) -> Option<CompressionType> {
+        match self {
+            Compression::None => None,
+            Compression::Lz4 => Some(CompressionType::LZ4_FRAME),
+            Compression::Zstd => Some(CompressionType::ZSTD),
+        }
+    }
+}
+
 /// How a trace is stored; none of it changes the trace's content hash.
 #[derive(Clone, Copy, Debug)]
 pub struct WriteOptions {
@@ -95,13 +106,8 @@ impl<W: Write> TraceWriter<W> {
         let mut schema = schema(&header);
         let marked = std::sync::Arc::make_mut(&mut schema);
         marked.metadata.insert(CHECKSUMS.to_string(), CHECKSUMS_KIND.to_string());
-        let compression = match options.compression {
-            Compression::None => None,
-            Compression::Lz4 => Some(CompressionType::LZ4_FRAME),
-            Compression::Zstd => Some(CompressionType::ZSTD),
-        };
         let ipc = IpcWriteOptions::default()
-            .try_with_compression(compression)
+            .try_with_compression(options.compression.codec())
             .map_err(|e| arrow_error(place, e))?;
         let file = FileWriter::try_new_with_options(SealingWriter::new(sink), &schema, ipc);
         let mut file = file.map_err(|e| arrow_error(place, e))?;

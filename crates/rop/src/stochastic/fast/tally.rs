@@ -19,6 +19,7 @@ pub struct Tally<'a, P> {
     pub(super) tracked: u64,
     surfaces: u64,
     compared: u64,
+    multiplied: u64,
     colours_read: u64,
     hashes: u64,
     /// Apart from the others: written where a number says, it must lie in memory.
@@ -37,6 +38,7 @@ impl<'a, P: Probe> Tally<'a, P> {
             tracked: 0,
             surfaces: 0,
             compared: 0,
+            multiplied: 0,
             colours_read: 0,
             hashes: 0,
             lengths,
@@ -65,6 +67,14 @@ impl<'a, P: Probe> Tally<'a, P> {
     pub fn compared(&mut self, count: u32) {
         if P::LISTENS {
             self.compared += u64::from(count);
+        }
+    }
+
+    /// So many multiplications.
+    #[inline(always)]
+    pub fn multiplied(&mut self, count: u32) {
+        if P::LISTENS {
+            self.multiplied += u64::from(count);
         }
     }
 
@@ -108,6 +118,7 @@ impl<'a, P: Probe> Tally<'a, P> {
             sorts_by_length,
             surfaces: self.surfaces,
             layers_compared: self.compared,
+            multiplications: Some(self.multiplied),
             state_bits_read: bits(self.tested, depth_bits)
                 + bits(self.colours_read, sample_bits - depth_bits)
                 + bits(self.tracked, state_bits),

@@ -235,11 +235,8 @@ impl<'a> Painter<'a> {
             let c = match splats.space {
                 own if own == self.space => c,
                 // A display shows no more than 1.
-                own => self.space.of_linear(own.to_linear(c.min(if own == Space::Encoded {
-                    1.0
-                } else {
-                    f64::INFINITY
-                }))),
+                Space::Encoded => self.space.of_linear(Space::Encoded.to_linear(c.min(1.0))),
+                own => self.space.of_linear(own.to_linear(c)),
             };
             // Beyond half precision there is no need to go.
             c.min(65504.0) as f32

@@ -1,7 +1,7 @@
 //! The numbers that accessors stand for (glTF 2.0, section 3.6.2).
 
 use super::Loader;
-use super::extensions::{Treatment, treatment};
+use super::extensions::treatment;
 use super::json::{Accessor, View};
 use screendoor_trace::error::{Error, Result};
 
@@ -290,10 +290,7 @@ impl Loader<'_> {
                 Some(name) => Error::unsupported(
                     format_args!("{}, {part}", self.place),
                     format_args!("its bytes are packed by {name}, which is not read"),
-                    match treatment(name) {
-                        Treatment::Packed(unpack) => unpack,
-                        _ => "export the file without the extension",
-                    },
+                    treatment(name).hint(),
                 ),
                 None => bad("its buffer's bytes are missing"),
             });

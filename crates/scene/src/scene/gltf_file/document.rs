@@ -95,13 +95,12 @@ fn check_version(path: &Path, asset: &Asset) -> Result<()> {
 
 fn check_required(path: &Path, root: &Root) -> Result<()> {
     for name in &root.extensions_required {
-        let hint = match treatment(name) {
-            Treatment::Packed(unpack) => unpack,
-            Treatment::Unknown(_) => "export the file without the extension",
-            _ => continue,
-        };
-        let what = format!("it requires {}, and the extension is not supported", shortened(name));
-        return Err(Error::unsupported(path.display(), what, hint));
+        let treatment = treatment(name);
+        if matches!(treatment, Treatment::Packed(_) | Treatment::Unknown(_)) {
+            let name = shortened(name);
+            let what = format!("it requires {name}, and the extension is not supported");
+            return Err(Error::unsupported(path.display(), what, treatment.hint()));
+        }
     }
     Ok(())
 }

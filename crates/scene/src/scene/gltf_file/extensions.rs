@@ -46,6 +46,18 @@ pub(super) enum Treatment {
     Unknown(&'static str),
 }
 
+impl Treatment {
+    /// What to do with a file of which this keeps something from being read.
+    pub(super) fn hint(self) -> &'static str {
+        match self {
+            Treatment::Packed(unpack) => unpack,
+            _ => EXPORT,
+        }
+    }
+}
+
+const EXPORT: &str = "export the file without the extension";
+
 /// What becomes of the extension of that name.
 pub(super) fn treatment(name: &str) -> Treatment {
     let known = EXTENSIONS.iter().find(|(known, _)| *known == name);
@@ -62,7 +74,6 @@ const EXTENSIONS: &[(&str, Treatment)] = {
     const KTX: &str =
         "its images cannot be decoded; 'gltf-transform ktxdecompress in.glb out.glb' unpacks them";
     const UNPACK: &str = "unpack it: gltf-transform copy in.glb out.glb";
-    const EXPORT: &str = "export the file without the extension";
     &[
         ("EXT_instance_features", Passed),
         ("EXT_lights_ies", Warned(LIGHTS)),

@@ -5,6 +5,7 @@ use glam::{Vec2, Vec3, Vec4};
 
 use super::Loader;
 use super::accessor::{Kind, Normalised, Numbers, Type};
+use super::extensions::treatment;
 use super::json::{Attributes, Node, Primitive};
 use super::material::{Made, SETS};
 use super::pose::{Bound, Joints, Set, normal_matrix};
@@ -260,10 +261,8 @@ impl Loader<'_> {
         let accessor = position.and_then(|p| self.root.accessors.get(*p));
         let empty = |a: &super::json::Accessor| a.buffer_view.is_none() && a.sparse.is_none();
         if primitive.extensions.has(packed) && accessor.is_none_or(empty) {
-            let what = format_args!(
-                "{packed} is not read: what it packs is not drawn; 'gltf-transform copy in.glb \
-                 out.glb' unpacks it"
-            );
+            let hint = treatment(packed).hint();
+            let what = format_args!("{packed} is not read: what it packs is not drawn; {hint}");
             return Some(self.warnings.matter(what));
         }
         let what = "primitives without positions are not drawn";

@@ -12,6 +12,7 @@ screendoor_trace::options! {
         Moved = "moved": "State moved",
         Hashes = "hashes": "Hashes",
         Comparators = "comparators": "Comparators",
+        Multiplications = "multiplications": "Multiplications",
         Cpu = "cpu": "CPU time",
         Gpu = "gpu": "GPU time",
     }
@@ -25,6 +26,7 @@ impl Cost {
             Cost::Moved => "bytes per fragment",
             Cost::Hashes => "hashes per fragment",
             Cost::Comparators => "comparisons per fragment",
+            Cost::Multiplications => "products per fragment",
             Cost::Cpu | Cost::Gpu => "ns per fragment",
         }
     }
@@ -41,6 +43,10 @@ impl Cost {
             Cost::Comparators => {
                 "depths compared for each fragment: depth tests, layers kept, and the comparators of sorting \
                  networks"
+            }
+            Cost::Multiplications => {
+                "colours, opacities and errors multiplied for each fragment; of designs for which \
+                 that is an honest count"
             }
             Cost::Cpu => {
                 "time of the fast engine on this machine's processor, median and quartiles"
@@ -71,6 +77,10 @@ impl Cost {
             Cost::Moved => record.bytes_moved_per_fragment(),
             Cost::Hashes => record.hashes_per_fragment(),
             Cost::Comparators => record.comparators_per_fragment(),
+            Cost::Multiplications if record.events.multiplications.is_none() => {
+                return Err("the design does not say".to_string());
+            }
+            Cost::Multiplications => record.multiplications_per_fragment(),
             Cost::Cpu | Cost::Gpu => return self.time(record),
         };
         counted.map(Spread::exactly).ok_or("no events were counted".to_string())

@@ -12,7 +12,7 @@ use screendoor_trace::trace::Trace;
 
 /// Finds out what would keep the runs of a part from being done that are not in `folder` yet:
 /// scenes that are not there or have no such name or parameters, textures, files of cameras and
-/// traces that cannot be read, traces that do not serve the sample counts or have no view where a design
+/// traces that cannot be read, cameras that are not there, traces that do not serve the sample counts or have no view where a design
 /// asks for it, and engines that this machine has not. Nothing is written.
 ///
 /// # Errors
@@ -114,10 +114,12 @@ fn check_scene(entry: &SceneEntry, folder: &Path, base: &Path, jobs: &[&Job]) ->
             return Err(Error::invalid(path.display(), what, "give a PNG or JPEG"));
         }
     }
-    // Cameras of the scene's own file are known when it is loaded.
     let choice = entry.camera_choice(base);
-    match choice.file() {
-        Some(_) => entry.check_pixel(choice.choose(&[])?.size),
-        None => Ok(()),
-    }
+    let own = match (&choice.camera, choice.file()) {
+        (None, _) => return Ok(()),
+        (Some(_), Some(_)) => Vec::new(),
+        // Known when the scene is loaded, which is done once more to draw it.
+        (Some(_), None) => entry.load(base)?.cameras,
+    };
+    entry.check_pixel(choice.choose(&own)?.size)
 }

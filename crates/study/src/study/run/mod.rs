@@ -2,6 +2,8 @@
 //! measured again.
 
 mod check;
+mod folder;
+mod json;
 mod measure;
 mod merge;
 mod scene;
@@ -13,8 +15,9 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 pub use check::check;
+pub use json::read_json;
 pub use merge::{Agreed, agree};
-pub use store::{Store, read_json};
+pub use store::Store;
 pub use tasks::{Job, Shard, Task, jobs, tasks};
 
 use crate::study::engine::EngineName;
@@ -23,6 +26,7 @@ use crate::study::file::Publication;
 use crate::study::measure::Reference;
 use crate::study::record::Record;
 use crate::study::results::Machine;
+use crate::study::run::json::put_sealed;
 use crate::study::run::measure::{Engines, measure_job};
 use crate::study::run::scene::{OpenScene, Watch};
 use screendoor_rop::{ExplainLimits, Site};
@@ -160,7 +164,7 @@ impl Runner<'_> {
 
     /// The record is written last: a run is there with all that belongs to it, or not.
     fn finish(&self, job: &Job, record: &Record) -> std::result::Result<(), Failure> {
-        Store::put_sealed(&self.store.record_file(&job.id), record)?;
+        put_sealed(&self.store.record_file(&job.id), record)?;
         // Of a try before this one.
         let _ = fs::remove_file(self.store.failure_file(&job.id));
         Ok(())

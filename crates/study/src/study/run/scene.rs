@@ -5,6 +5,7 @@ use std::path::Path;
 use crate::study::file::SceneEntry;
 use crate::study::measure::Subject;
 use crate::study::results::SceneFacts;
+use crate::study::run::json::put_sealed;
 use crate::study::run::store::Store;
 use screendoor_designs::REFERENCE;
 use screendoor_scene::capture::{Capture, CaptureOptions};
@@ -143,7 +144,7 @@ fn facts(
         },
         statistics: statistics_within(trace, store.study().memory << 20, |_, _| ())?,
     };
-    Store::put_sealed(&store.scene_file(index), &facts)?;
+    put_sealed(&store.scene_file(index), &facts)?;
     Ok(facts)
 }
 

@@ -1,0 +1,9 @@
+#version 450
+#extension GL_EXT_demote_to_helper_invocation : require
+layout(location = 0) in vec4 colour;
+layout(location = 0) out vec4 result;
+
+void main() {
+    if (colour.a < 0.5) demote;
+    result = helperInvocationEXT() || gl_HelperInvocation ? vec4(0.0) : colour;
+}

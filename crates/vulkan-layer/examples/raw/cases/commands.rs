@@ -1,0 +1,104 @@
+//! Command buffers: secondaries, and the same one submitted again.
+
+use ash::vk;
+use vk::CommandBufferUsageFlags as Usage;
+
+use crate::failure::Result;
+use crate::gpu::Gpu;
+use crate::pipeline::Plan;
+use crate::record::{Recorder, read};
+use crate::scene::{Shape, shapes};
+use crate::target::{Target, TargetPlan};
+
+pub(super) fn secondaries() -> Result<Vec<u8>> {
+    executed(Usage::ONE_TIME_SUBMIT, |first, second| vec![second, first])
+}
+
+pub(super) fn secondary_twice() -> Result<Vec<u8>> {
+    executed(Usage::SIMULTANEOUS_USE, |first, second| vec![first, second, first])
+}
+
+/// Records two secondaries and executes them as `order` says.
+fn executed(
+    flags: Usage,
+    order: impl FnOnce(vk::CommandBuffer, vk::CommandBuffer) -> Vec<vk::CommandBuffer>,
+) -> Result<Vec<u8>> {
+    let gpu = Gpu::plain()?;
+    let target = Target::new(&gpu, TargetPlan::default())?;
+    let plan = Plan::new(&gpu, &target)?;
+    let pipeline = plan.create(&gpu)?;
+    let secondary = |shapes| {
+        let recorder = Recorder::secondary(&gpu, &target, flags)?;
+        recorder.bind(pipeline);
+        recorder.shapes(plan.layout, shapes);
+        recorder.end()
+    };
+    let all = shapes();
+    let (first, second) = (secondary(&all[..4])?, secondary(&all[4..])?);
+    let recorder = Recorder::once(&gpu)?;
+    recorder.pass_of(&target, target.pass, vk::SubpassContents::SECONDARY_COMMAND_BUFFERS);
+    recorder.execute(&order(first, second));
+    recorder.end_pass();
+    recorder.run()?;
+    read(&gpu, target.images.finished())
+}
+
+pub(super) fn twice() -> Result<Vec<u8>> {
+    repeated(|gpu, primary| gpu.run(&[primary, primary]))
+}
+
+pub(super) fn again() -> Result<Vec<u8>> {
+    repeated(|gpu, primary| {
+        gpu.submit(&[primary])?;
+        gpu.run(&[primary])
+    })
+}
+
+/// Records a primary that draws onto what is there, and submits it as `submit` says.
+fn repeated(submit: impl FnOnce(&Gpu, vk::CommandBuffer) -> Result<()>) -> Result<Vec<u8>> {
+    let gpu = Gpu::plain()?;
+    let target = Target::new(&gpu, TargetPlan::default())?;
+    let plan = Plan::new(&gpu, &target)?;
+    let pipeline = plan.create(&gpu)?;
+    let loading = target.plan.pass(&gpu, true)?;
+
+    let cleared = Recorder::once(&gpu)?;
+    cleared.pass(&target);
+    cleared.end_pass();
+    cleared.run()?;
+
+    let recorder = Recorder::new(&gpu, Usage::SIMULTANEOUS_USE)?;
+    recorder.pass_of(&target, loading, vk::SubpassContents::INLINE);
+    recorder.bind(pipeline);
+    recorder.shapes(plan.layout, &shapes());
+    recorder.end_pass();
+    submit(&gpu, recorder.end()?)?;
+    read(&gpu, target.images.finished())
+}
+
+/// Recorded, thrown away with its pool's memory, recorded again, submitted.
+pub(super) fn recorded_again() -> Result<Vec<u8>> {
+    let gpu = Gpu::plain()?;
+    let target = Target::new(&gpu, TargetPlan::default())?;
+    let plan = Plan::new(&gpu, &target)?;
+    let pipeline = plan.create(&gpu)?;
+    let recorder = Recorder::once(&gpu)?;
+    let draw = |recorder: &Recorder<'_>, shapes: &[Shape]| {
+        recorder.pass(&target);
+        recorder.bind(pipeline);
+        recorder.shapes(plan.layout, shapes);
+        recorder.end_pass();
+    };
+    draw(&recorder, &shapes()[..2]);
+    let buffer = recorder.end()?;
+    // SAFETY: no buffer of the pool was submitted.
+    unsafe {
+        gpu.device.reset_command_pool(gpu.pool, vk::CommandPoolResetFlags::RELEASE_RESOURCES)?;
+        let info = vk::CommandBufferBeginInfo::default().flags(Usage::ONE_TIME_SUBMIT);
+        gpu.device.begin_command_buffer(buffer, &info)?;
+    }
+    let recorder = Recorder { gpu: &gpu, buffer };
+    draw(&recorder, &shapes()[2..]);
+    recorder.run()?;
+    read(&gpu, target.images.finished())
+}

@@ -1,0 +1,8 @@
+#version 450
+layout(location = 0) in vec4 colour;
+layout(location = 1) flat in uint instance;
+layout(location = 0) out vec4 target;
+
+void main() {
+    target = instance % 2 == 0 ? colour : colour.gbra;
+}

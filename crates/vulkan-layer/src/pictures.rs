@@ -1,0 +1,160 @@
+//! Pixels of the program's images, copied between its submissions.
+
+use ash::vk::{self, Handle};
+
+use crate::device::Device;
+use crate::memory::Buffer;
+use crate::objects::Image;
+use crate::recorder::Recorder;
+use crate::submit;
+use crate::table::next;
+
+/// Bytes of a pixel of a format that colours are drawn to, uncompressed.
+fn pixel_bytes(format: vk::Format) -> Option<u64> {
+    use vk::Format as F;
+    Some(match format {
+        F::R8_UNORM | F::R8_SRGB | F::R8_UINT | F::R8_SINT => 1,
+        F::R8G8_UNORM | F::R8G8_SRGB | F::R16_SFLOAT | F::R16_UNORM | F::R5G6B5_UNORM_PACK16 => 2,
+        F::R8G8B8A8_UNORM
+        | F::R8G8B8A8_SRGB
+        | F::B8G8R8A8_UNORM
+        | F::B8G8R8A8_SRGB
+        | F::A8B8G8R8_UNORM_PACK32
+        | F::A8B8G8R8_SRGB_PACK32
+        | F::A2B10G10R10_UNORM_PACK32
+        | F::A2R10G10B10_UNORM_PACK32
+        | F::B10G11R11_UFLOAT_PACK32
+        | F::R16G16_SFLOAT
+        | F::R16G16_UNORM
+        | F::R32_SFLOAT => 4,
+        F::R16G16B16A16_SFLOAT | F::R16G16B16A16_UNORM | F::R32G32_SFLOAT => 8,
+        F::R32G32B32A32_SFLOAT => 16,
+        _ => return None,
+    })
+}
+
+/// Why an image's pixels cannot be read, or how many bytes of each there are.
+fn possible(image: &Image) -> Result<u64, &'static str> {
+    let bytes = pixel_bytes(image.format).ok_or("its format is not known here")?;
+    match image {
+        Image { samples: 2.., .. } => Err("it has several samples a pixel"),
+        Image { readable: false, .. } => Err("the driver does not let it be copied"),
+        Image { layout: vk::ImageLayout::UNDEFINED, .. } => Err("nothing was drawn to it"),
+        _ => Ok(bytes),
+    }
+}
+
+/// Writes the pixels of the first level and layer of an image as they are now, before or after a
+/// submission. Everything that was submitted has been run.
+pub(crate) fn picture(
+    d: &Device,
+    recorder: &mut Recorder,
+    queue: vk::Queue,
+    image: &Image,
+    submission: u64,
+    after: bool,
+) {
+    let Ok(pixel) = possible(image) else { return };
+    let size = u64::from(image.extent.width) * u64::from(image.extent.height) * pixel;
+    let usage = vk::BufferUsageFlags::TRANSFER_DST;
+    let Ok(buffer) = Buffer::new(d.handle, &d.table, &d.memory, size, usage) else { return };
+    match copy(d, recorder, queue, image, buffer.handle) {
+        Ok(()) => {
+            let pixels = unsafe { std::slice::from_raw_parts(buffer.bytes, size as usize) };
+            recorder.image(image.log());
+            recorder.picture(image.number, submission, after, pixels);
+        }
+        Err(result) => recorder.note(&format!("an image cannot be read: {result}")),
+    }
+    buffer.destroy(d.handle, &d.table);
+}
+
+fn copy(
+    d: &Device,
+    recorder: &mut Recorder,
+    queue: vk::Queue,
+    image: &Image,
+    to: vk::Buffer,
+) -> Result<(), vk::Result> {
+    let null = std::ptr::null();
+    let family = d.objects().queues.get(&queue.as_raw()).copied().unwrap_or(0);
+    let pool = match recorder.pools.get(&family) {
+        Some(pool) => *pool,
+        None => {
+            let info = vk::CommandPoolCreateInfo::default().queue_family_index(family);
+            let mut pool = vk::CommandPool::null();
+            let result: vk::Result =
+                next!(d.table.create_command_pool, d.handle, &info, null, &mut pool);
+            result.result()?;
+            recorder.pools.insert(family, pool);
+            pool
+        }
+    };
+    let info = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(1);
+    let mut buffer = vk::CommandBuffer::null();
+    let result: vk::Result = next!(d.table.allocate_command_buffers, d.handle, &info, &mut buffer);
+    result.result()?;
+    if let Some(set) = d.set_loader_data {
+        let result = unsafe { set(d.handle, buffer.as_raw() as *mut _) };
+        result.result()?;
+    }
+    let result = fill(d, queue, image, to, buffer);
+    let () = next!(d.table.free_command_buffers, d.handle, pool, 1, &buffer);
+    result
+}
+
+fn fill(
+    d: &Device,
+    queue: vk::Queue,
+    image: &Image,
+    to: vk::Buffer,
+    buffer: vk::CommandBuffer,
+) -> Result<(), vk::Result> {
+    let result: vk::Result = next!(d.table.begin, buffer, &vk::CommandBufferBeginInfo::default());
+    result.result()?;
+    let aspect = vk::ImageAspectFlags::COLOR;
+    let between = |from, to| {
+        let range =
+            vk::ImageSubresourceRange::default().aspect_mask(aspect).level_count(1).layer_count(1);
+        let all = vk::AccessFlags::MEMORY_READ | vk::AccessFlags::MEMORY_WRITE;
+        let barrier = vk::ImageMemoryBarrier::default()
+            .src_access_mask(all)
+            .dst_access_mask(all)
+            .old_layout(from)
+            .new_layout(to)
+            .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+            .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+            .image(image.handle)
+            .subresource_range(range);
+        let stages = vk::PipelineStageFlags::ALL_COMMANDS;
+        let (none, null) = (vk::DependencyFlags::empty(), std::ptr::null());
+        let () = next!(
+            d.table.barrier,
+            buffer,
+            stages,
+            stages,
+            none,
+            0,
+            null,
+            0,
+            std::ptr::null(),
+            1,
+            &barrier
+        );
+    };
+    let reading = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
+    between(image.layout, reading);
+    let layers = vk::ImageSubresourceLayers::default().aspect_mask(aspect).layer_count(1);
+    let region = vk::BufferImageCopy::default()
+        .image_subresource(layers)
+        .image_extent(vk::Extent3D { depth: 1, ..image.extent });
+    let () = next!(d.table.copy_to_buffer, buffer, image.handle, reading, to, 1, &region);
+    between(reading, image.layout);
+    let result: vk::Result = next!(d.table.end, buffer);
+    result.result()?;
+    let buffers = [buffer];
+    let info = vk::SubmitInfo::default().command_buffers(&buffers);
+    let result: vk::Result = next!(d.table.submit, queue, 1, &info, vk::Fence::null());
+    result.result()?;
+    if submit::drain(d, queue, submit::PATIENCE) { Ok(()) } else { Err(vk::Result::TIMEOUT) }
+}
