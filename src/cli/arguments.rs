@@ -7,7 +7,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use clap::builder::{PossibleValue, StringValueParser, TypedValueParser};
+use clap::builder::{PossibleValue, Resettable, StringValueParser, TypedValueParser};
 use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
 
 use crate::cli::console::Console;
@@ -173,7 +173,10 @@ impl<A: FromArgMatches, C> FromArgMatches for Each<A, C> {
 impl<A: Args, C: Change> Args for Each<A, C> {
     fn augment_args(command: Command) -> Command {
         let own = A::augment_args(Command::new("own"));
-        own.get_arguments().fold(command, |command, arg| command.arg(C::change(arg.clone())))
+        own.get_arguments().fold(command, |command, arg| {
+            // In the order in which they are added here.
+            command.arg(C::change(arg.clone()).display_order(Resettable::Reset))
+        })
     }
 
     fn augment_args_for_update(command: Command) -> Command {

@@ -52,6 +52,8 @@ struct WithVulkan;
 
 impl Change for WithVulkan {
     fn change(argument: Arg) -> Arg {
+        // What is required is not asked for where something else forbids it: a scene.
+        let argument = argument.conflicts_with("scene");
         if argument.get_id() == "vulkan" { argument } else { argument.requires("vulkan") }
     }
 }
