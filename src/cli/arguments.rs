@@ -7,7 +7,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use clap::builder::{PossibleValue, StringValueParser, TypedValueParser};
+use clap::builder::{PossibleValue, Resettable, StringValueParser, TypedValueParser};
 use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
 
 use crate::cli::console::Console;
@@ -146,21 +146,6 @@ pub(super) fn scene(name: &OsStr) -> Result<(&str, Option<&Path>)> {
     Ok((text, scene::path_of(text)))
 }
 
-/// What a command may take for what grows with a trace. What that is there, each command says as
-/// the argument's help.
-#[derive(Debug, Args)]
-pub(super) struct MemoryArgument {
-    #[arg(long, default_value_t = 512, value_name = "MIB", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=1 << 20))]
-    memory: u64,
-}
-
-impl MemoryArgument {
-    /// In bytes.
-    pub fn bytes(&self) -> u64 {
-        self.memory << 20
-    }
-}
-
 /// Arguments of which each is changed in the same way.
 #[derive(Debug)]
 pub(super) struct Each<A, C> {
@@ -188,11 +173,29 @@ impl<A: FromArgMatches, C> FromArgMatches for Each<A, C> {
 impl<A: Args, C: Change> Args for Each<A, C> {
     fn augment_args(command: Command) -> Command {
         let own = A::augment_args(Command::new("own"));
-        own.get_arguments().fold(command, |command, arg| command.arg(C::change(arg.clone())))
+        own.get_arguments().fold(command, |command, arg| {
+            // In the order in which they are added here.
+            command.arg(C::change(arg.clone()).display_order(Resettable::Reset))
+        })
     }
 
     fn augment_args_for_update(command: Command) -> Command {
         Self::augment_args(command)
+    }
+}
+
+/// What a command may take for what grows with a trace. What that is there, each command says as
+/// the argument's help.
+#[derive(Debug, Args)]
+pub(super) struct MemoryArgument {
+    #[arg(long, default_value_t = 512, value_name = "MIB", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=1 << 20))]
+    memory: u64,
+}
+
+impl MemoryArgument {
+    /// In bytes.
+    pub fn bytes(&self) -> u64 {
+        self.memory << 20
     }
 }
 

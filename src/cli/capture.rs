@@ -52,6 +52,8 @@ struct WithVulkan;
 
 impl Change for WithVulkan {
     fn change(argument: Arg) -> Arg {
+        // What is required is not asked for where something else forbids it: a scene.
+        let argument = argument.conflicts_with("scene");
         if argument.get_id() == "vulkan" { argument } else { argument.requires("vulkan") }
     }
 }
@@ -70,6 +72,11 @@ pub(super) struct CommonArguments {
     /// format says
     #[arg(long, value_parser = option::<Space>())]
     pub space: Option<Space>,
+    /// Samples per pixel: 64 where not given, 4 with --gpu, 16 with --pattern standard; a
+    /// trace of 64 serves every smaller count too. With --vulkan a multiple of the program's own,
+    /// which are repeated
+    #[arg(long, value_name = "N", value_parser = samples, allow_negative_numbers = true)]
+    pub samples: Option<u32>,
     /// Linear colour behind all, each channel 0 to 65504
     #[arg(long, value_name = "R,G,B", value_parser = colour, allow_hyphen_values = true)]
     pub background: Option<[f64; 3]>,
@@ -97,12 +104,6 @@ impl CommonArguments {
     pub fn output(&self) -> Result<&Path> {
         let none = || Error::config("it is not said where the trace goes", "name it with -o");
         let output = self.output.as_deref().ok_or_else(none)?;
-        if output == Path::new("-") {
-            return Err(Error::config(
-                "a trace cannot go to standard output",
-                "name a file (./- for one that is called so)",
-            ));
-        }
         check_output(output, Kind::Trace)?;
         Ok(output)
     }
@@ -119,10 +120,6 @@ struct SceneArguments {
     /// Frame size in pixels: that of --camera, or 800x800, where not given
     #[arg(long, value_name = "WxH", value_parser = size)]
     size: Option<(u32, u32)>,
-    /// Samples per pixel: 64 where not given, 4 with --gpu, 16 with --pattern standard; a
-    /// trace of 64 serves every smaller count too
-    #[arg(long, value_name = "N", value_parser = samples, allow_negative_numbers = true)]
-    samples: Option<u32>,
     /// Where the samples lie
     #[arg(long, default_value = "auto", value_parser = option::<PatternKind>())]
     pattern: PatternKind,
@@ -268,7 +265,7 @@ fn run_scene(
     let options = CaptureOptions {
         width,
         height,
-        samples: arguments.samples.unwrap_or(match arguments.pattern {
+        samples: common.samples.unwrap_or(match arguments.pattern {
             _ if arguments.gpu => 4,
             // The largest there is.
             PatternKind::Standard => 16,

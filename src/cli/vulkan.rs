@@ -7,14 +7,14 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde::Serialize;
 
-use crate::cli::arguments::{option, range};
+use crate::cli::arguments::{MemoryArgument, option, range};
 use crate::cli::capture::CommonArguments;
 use crate::cli::console::{Console, grouped, shown, table};
-use crate::cli::files::{Json, check, report};
-use crate::cli::signals::{on_interrupt, runs_under_us};
+use crate::cli::files::{Json, check, keep_trace, print_trace, report};
+use crate::cli::signals::runs_under_us;
 use crate::error::{Error, Result};
 use crate::output::{OutputFile, TemporaryFolder};
-use crate::trace::{TraceWriter, WriteOptions};
+use crate::trace::{MAX_SAMPLES, TraceWriter, WriteOptions};
 use crate::vulkan::{
     Captures, Check, Conversion, ConvertOptions, Converted, DepthRule, Ended, ListedDevice,
     ListedPass, Listing, Run, Settings, Span, TargetChoice, layer_library, why_nothing,
@@ -22,6 +22,9 @@ use crate::vulkan::{
 
 /// What is captured of which program.
 #[derive(Debug, Args)]
+#[command(mut_arg("memory", |memory| {
+    memory.help("MiB that fragments may take that are put into order together; less takes longer")
+}))]
 pub(super) struct VulkanArguments {
     /// Run a program and record the fragments of a frame of it
     #[arg(long, group = "held_against")]
@@ -61,9 +64,8 @@ pub(super) struct VulkanArguments {
     /// Records of fragments to have memory for on the GPU at the start, 48 bytes each
     #[arg(long, value_name = "N", allow_negative_numbers = true, conflicts_with = "from", value_parser = clap::value_parser!(u64).range(1..=1 << 32))]
     capacity: Option<u64>,
-    /// MiB that fragments may take that are put into order together; less takes longer
-    #[arg(long, default_value_t = 512, value_name = "MIB", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=1 << 20))]
-    memory: u64,
+    #[command(flatten)]
+    memory: MemoryArgument,
     /// The program, and what it is given
     #[arg(last = true, value_name = "PROGRAM", conflicts_with = "from")]
     program: Vec<OsString>,
@@ -111,7 +113,8 @@ pub(super) fn run(
         background: common.background.map(|b| b.map(|c| c as f32)),
         space: common.space,
         colour: common.colour(),
-        memory: arguments.memory << 20,
+        samples: common.samples.unwrap_or(MAX_SAMPLES),
+        memory: arguments.memory.bytes(),
     };
     let progress = console.progress("counting", "fragments");
     let conversion = Conversion::new(&captures, options)?;
@@ -127,11 +130,7 @@ pub(super) fn run(
     drop(progress);
     let (file, written) = writer.finish()?;
     console.warn_all(&converted.warnings, common.strict, &header.source)?;
-    file.commit()?;
-    on_interrupt({
-        let place = place.clone();
-        move || format!("{place} is whole and kept")
-    });
+    keep_trace(file)?;
     let document = Document {
         trace: place,
         width: header.width,
@@ -145,22 +144,16 @@ pub(super) fn run(
     };
     report(json, "screendoor.vulkan", &document, console, || {
         console.print(format_args!(
-            "{} of target #{} ({} x {}, {}, {} samples)",
+            "{}, target #{}: {} draws into {} x {} pixels, {}, samples: {}",
             converted.frame,
             converted.target,
+            grouped(converted.objects.len() as u64),
             header.width,
             header.height,
             converted.format,
             header.pattern.samples(),
         ))?;
-        console.print(format_args!(
-            "{}: {} fragments of {} draws, {:.1} MB, content {}",
-            shown(&document.trace),
-            grouped(written.rows),
-            converted.objects.len(),
-            written.bytes as f64 / 1e6,
-            &written.content[..16],
-        ))?;
+        print_trace(&document.trace, &written, written.rows, console)?;
         checked.iter().try_for_each(|check| print_check(check, console))
     })
 }

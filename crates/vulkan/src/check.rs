@@ -118,7 +118,7 @@ impl Conversion<'_> {
             Err(why) => return Ok(Check::incomparable(why, caveats)),
         };
         let size = [self.header().width, self.header().height];
-        let samples = self.header().pattern.samples() as usize;
+        let samples = self.program_samples as usize;
         let mut redrawing = Redrawing {
             conversion: self,
             format: &self.format,
@@ -230,7 +230,7 @@ impl Conversion<'_> {
         let Some((pass, colour, submission)) = last else {
             return Err("nothing is drawn into the target".to_string());
         };
-        let is_single = self.header().pattern.samples() == 1;
+        let is_single = self.program_samples == 1;
         let shown = match &pass.resolve {
             Some(resolve) => resolve,
             None if is_single => colour,

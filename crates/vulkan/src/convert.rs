@@ -7,7 +7,8 @@ use screendoor_trace::error::{Error, Result};
 use screendoor_trace::param::Options;
 use screendoor_trace::picture::Space;
 use screendoor_trace::trace::{
-    ColourFormat, DepthPlane, Fragment, Header, SampleMask, SamplePattern, TraceWriter, Unorm32,
+    ColourFormat, ColumnId, DepthPlane, Fragment, Header, MAX_SAMPLES, SampleMask, SamplePattern,
+    Scalar, TraceWriter, Unorm32,
 };
 use serde::Serialize;
 
@@ -36,6 +37,9 @@ pub struct ConvertOptions {
     pub space: Option<Space>,
     /// Precision of colours in the trace.
     pub colour: ColourFormat,
+    /// Samples a pixel in the trace: a multiple of the program's own, which are repeated, so that
+    /// designs can use more samples than the program did and see the same edges.
+    pub samples: u32,
     /// How many bytes the records that are held together may take; fewer make more passes over
     /// them.
     pub memory: u64,
@@ -50,9 +54,35 @@ impl Default for ConvertOptions {
             background: None,
             space: None,
             colour: ColourFormat::F16,
+            samples: MAX_SAMPLES,
             memory: 512 << 20,
         }
     }
+}
+
+/// A program's pattern, repeated until it has `samples`.
+fn repeated(own: &SamplePattern, samples: u32) -> Result<SamplePattern> {
+    let n = own.samples();
+    if !SamplePattern::is_count(samples) || samples < n {
+        return Err(Error::config(
+            format_args!("{samples} samples a pixel cannot hold the program's {n}"),
+            format_args!("ask for a power of two from {n} to {MAX_SAMPLES}"),
+        ));
+    }
+    if samples == n {
+        return Ok(own.clone());
+    }
+    let positions = own.positions.iter().copied().cycle().take(samples as usize).collect();
+    let name = format!("{}, {} times", own.name, samples / n);
+    // Fewer than the program's own are the first of them.
+    Ok(SamplePattern { name, positions, nested: true })
+}
+
+/// Where a program has one sample a pixel, a fragment covers all of the trace's.
+fn coverage_of_all(own: u32, samples: u32) -> BTreeMap<ColumnId, Scalar> {
+    let all = SampleMask::first(samples).0;
+    let constant = (own == 1 && samples > 1).then_some((ColumnId::Coverage, Scalar::Unsigned(all)));
+    constant.into_iter().collect()
 }
 
 /// A capture about to become a trace.
@@ -60,6 +90,8 @@ pub struct Conversion<'a> {
     pub(crate) chosen: Chosen<'a>,
     pub(crate) options: ConvertOptions,
     header: Header,
+    /// Samples a pixel of the target.
+    pub(crate) program_samples: u32,
     /// Of the target, as it is drawn into.
     pub(crate) format: PixelFormat,
     format_number: i32,
@@ -184,10 +216,11 @@ impl<'a> Conversion<'a> {
                 "choose another one of --list with --target",
             ));
         };
-        let Some(pattern) = SamplePattern::standard(image.samples) else {
+        let Some(own) = SamplePattern::standard(image.samples) else {
             let what = format!("where its {} samples lie is nowhere laid down", image.samples);
             return Err(Error::unsupported(place, what, "have the program use 1, 2, 4, 8 or 16"));
         };
+        let pattern = repeated(&own, options.samples)?;
         let depth = match options.depth {
             DepthRule::Auto if plan.kept().any(|p| p.tested().is_some()) => DepthRule::Program,
             DepthRule::Auto => DepthRule::Order,
@@ -200,6 +233,7 @@ impl<'a> Conversion<'a> {
         };
         let [width, height] = chosen.capture.size(chosen.place);
         let device = &chosen.capture.device;
+        let program_samples = own.samples();
         let header = Header {
             width,
             height,
@@ -214,10 +248,20 @@ impl<'a> Conversion<'a> {
                 chosen.frame.name(chosen.capture)
             ),
             camera: "the program's own".to_string(),
+            constants: coverage_of_all(program_samples, options.samples),
             ..Header::default()
         };
         header.check()?;
-        Ok(Conversion { chosen, options, header, format, format_number, background, depth })
+        Ok(Conversion {
+            chosen,
+            options,
+            header,
+            program_samples,
+            format,
+            format_number,
+            background,
+            depth,
+        })
     }
 
     /// The header of the trace.
@@ -296,6 +340,13 @@ impl<'a> Conversion<'a> {
             push(&Fragment { x, y, coverage, depth, colour, alpha, ..Fragment::default() })
         })?;
         Ok(true)
+    }
+
+    /// What covers some of the program's samples, as samples of the trace.
+    pub(crate) fn spread(&self, coverage: u64) -> SampleMask {
+        let all = SampleMask::first(self.program_samples).0;
+        let times = (0..self.options.samples).step_by(self.program_samples as usize);
+        SampleMask(times.fold(0, |mask, at| mask | (coverage & all) << at))
     }
 
     /// What depths are, by its name.

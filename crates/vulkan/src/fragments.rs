@@ -63,7 +63,7 @@ impl<'a> Making<'a> {
             plan,
             depth,
             reversed: plan.reversed().0,
-            samples: SampleMask::first(conversion.header().pattern.samples()).0,
+            samples: SampleMask::first(conversion.program_samples).0,
             step: if step == 0 { 1 } else { 1 << step.ilog2() },
             most: match conversion.options.colour {
                 ColourFormat::F16 => 65504.0,
@@ -282,7 +282,7 @@ impl<'a> Making<'a> {
         push(&Fragment {
             x: piece.record.x() as u16,
             y: piece.record.y() as u16,
-            coverage: SampleMask(piece.coverage),
+            coverage: self.conversion.spread(piece.coverage),
             depth,
             colour: colour.map(|v| v.clamp(-most, most) as f32),
             alpha: alpha as f32,
