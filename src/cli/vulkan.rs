@@ -113,7 +113,7 @@ pub(super) fn run(
         background: common.background.map(|b| b.map(|c| c as f32)),
         space: common.space,
         colour: common.colour(),
-        samples: common.samples.unwrap_or(MAX_SAMPLES),
+        samples: Some(common.samples.unwrap_or(MAX_SAMPLES)),
         memory: arguments.memory.bytes(),
     };
     let progress = console.progress("counting", "fragments");

@@ -38,8 +38,9 @@ pub struct ConvertOptions {
     /// Precision of colours in the trace.
     pub colour: ColourFormat,
     /// Samples a pixel in the trace: a multiple of the program's own, which are repeated, so that
-    /// designs can use more samples than the program did and see the same edges.
-    pub samples: u32,
+    /// designs can use more samples than the program did and see the same edges; that number
+    /// where not given.
+    pub samples: Option<u32>,
     /// How many bytes the records that are held together may take; fewer make more passes over
     /// them.
     pub memory: u64,
@@ -54,10 +55,15 @@ impl Default for ConvertOptions {
             background: None,
             space: None,
             colour: ColourFormat::F16,
-            samples: MAX_SAMPLES,
+            samples: None,
             memory: 512 << 20,
         }
     }
+}
+
+/// A program's name without its folder, which says more of a machine than of a trace.
+fn file_name(program: &str) -> &str {
+    program.rsplit(['/', '\\']).next().unwrap_or(program)
 }
 
 /// A program's pattern, repeated until it has `samples`.
@@ -220,7 +226,7 @@ impl<'a> Conversion<'a> {
             let what = format!("where its {} samples lie is nowhere laid down", image.samples);
             return Err(Error::unsupported(place, what, "have the program use 1, 2, 4, 8 or 16"));
         };
-        let pattern = repeated(&own, options.samples)?;
+        let pattern = repeated(&own, options.samples.unwrap_or(own.samples()))?;
         let depth = match options.depth {
             DepthRule::Auto if plan.kept().any(|p| p.tested().is_some()) => DepthRule::Program,
             DepthRule::Auto => DepthRule::Order,
@@ -234,6 +240,7 @@ impl<'a> Conversion<'a> {
         let [width, height] = chosen.capture.size(chosen.place);
         let device = &chosen.capture.device;
         let program_samples = own.samples();
+        let samples = pattern.samples();
         let header = Header {
             width,
             height,
@@ -243,12 +250,12 @@ impl<'a> Conversion<'a> {
             colour: options.colour,
             source: format!(
                 "{} on {}, {}",
-                device.program,
+                file_name(&device.program),
                 device.name,
                 chosen.frame.name(chosen.capture)
             ),
             camera: "the program's own".to_string(),
-            constants: coverage_of_all(program_samples, options.samples),
+            constants: coverage_of_all(program_samples, samples),
             ..Header::default()
         };
         header.check()?;
@@ -345,7 +352,7 @@ impl<'a> Conversion<'a> {
     /// What covers some of the program's samples, as samples of the trace.
     pub(crate) fn spread(&self, coverage: u64) -> SampleMask {
         let all = SampleMask::first(self.program_samples).0;
-        let times = (0..self.options.samples).step_by(self.program_samples as usize);
+        let times = (0..self.header.pattern.samples()).step_by(self.program_samples as usize);
         SampleMask(times.fold(0, |mask, at| mask | (coverage & all) << at))
     }
 

@@ -2,8 +2,9 @@
 
 use super::*;
 use crate::DepthRule;
+use screendoor_trace::error::Error;
 use screendoor_trace::picture::Space;
-use screendoor_trace::trace::{ColourFormat, SampleMask};
+use screendoor_trace::trace::{ColourFormat, ColumnId, SampleMask};
 
 const BLACK: [f32; 4] = [0.0, 0.0, 0.0, 1.0];
 
@@ -284,4 +285,30 @@ fn little_memory_makes_the_same_trace() {
     }
     let none = convert(&captures, ConvertOptions { memory: 47, ..options() });
     assert!(none.map(|_| ()).unwrap_err().to_string().contains("give at least 48"));
+}
+
+#[test]
+fn a_program_s_samples_are_repeated() {
+    let coverages = |own: u32, samples: u32| {
+        let mut made = Made::with(UNORM, own);
+        let covering = |coverage, x| Record { coverage, ..grey(0, x, 0.5) };
+        made.submit(
+            vec![begin(pass(CLEAR, BLACK)), draw(over(0))],
+            vec![covering(0b0001, 0), covering(0b0101, 1)],
+        );
+        let options = ConvertOptions { samples: Some(samples), ..options() };
+        let (trace, _) = convert(&made.captures(), options)?;
+        let header = trace.header().clone();
+        Ok((fragments(&trace).iter().map(|f| f.coverage.0).collect::<Vec<_>>(), header))
+    };
+    let (found, header) = coverages(4, 8).unwrap();
+    assert_eq!(found, [0b0001_0001, 0b0101_0101]);
+    let positions = &header.pattern.positions;
+    assert!(positions[..4] == positions[4..] && header.pattern.prefix(4).is_ok());
+    let (found, header) = coverages(1, 64).unwrap();
+    assert_eq!(found, [u64::MAX; 2]);
+    assert!(header.constants.contains_key(&ColumnId::Coverage), "{header:?}");
+    assert_eq!(header.pattern.positions, [[0, 0]; 64]);
+    let error: Error = coverages(4, 2).unwrap_err();
+    assert!(error.to_string().contains("cannot hold the program's 4"), "{error}");
 }
