@@ -5,13 +5,14 @@ use maud::{Markup, html};
 use crate::chart::{Bar, Kind, Row, Rows, Segment, swatch};
 use crate::html::choice::share_cell;
 use crate::html::parts::{Cell, Content, figure, nothing, table};
-use crate::html::words::{estimated, figures, fixed};
+use crate::html::words::{counted, estimated, figures, fixed};
 use screendoor_study::study::analysis::baseline;
 use screendoor_study::study::record::Record;
 
 pub(super) fn section(content: &Content<'_>) -> Markup {
     let on = baseline(&content.results.study);
     let again = || html! { (content.study_command()) (content.replay_one()) };
+    let seeds = counted(content.results.study.seeds as usize, "seed");
     html! {
         h3 { "Relative to the baseline, all scenes" }
         (figure("relative", &relative(content), &html! {
@@ -30,14 +31,15 @@ pub(super) fn section(content: &Content<'_>) -> Markup {
             " Variance is noise, which more seeds or frames average away; " (swatch("bias"))
             " squared bias is not. The bias is estimated without bias of its own, so it scatters \
              around 0, and what falls below is drawn as nothing: pointing at it gives the estimate with \
-             its sign and its 95 % interval. A design that no seed changes has its whole error as bias."
+             its sign and its 95 % interval, over " (seeds) ". A design that no seed changes has its whole error as bias."
         }, &again()))
         details {
             summary { "All errors at " (content.count) " samples" }
             (figure("errors", &content.by_scene(|scene| all_errors(content, scene)), &html! {
                 "8-bit units. Covered: pixels with at least one fragment; interior: those that no \
                  primitive's edge crosses; edges: the others. Mean error: picture minus exact picture, \
-                 with its sign and, where seeds change the picture, its 95 % interval. Fine: against the exact picture of all \
+                 with its sign and, where seeds change the picture, its 95 % interval over " (seeds) ": \
+                 to tell a bias that lies within takes more seeds. Fine: against the exact picture of all \
                  the trace's samples, so that missing antialiasing counts."
             }, &again()))
         }
