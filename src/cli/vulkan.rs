@@ -304,6 +304,9 @@ fn new_folder(path: &Path) -> Result<PathBuf> {
     path.canonicalize().map_err(fail)
 }
 
+/// The most passes of a device that are listed one by one.
+const MOST_PASSES: usize = 100;
+
 /// Prints what a device recorded.
 fn print(device: &ListedDevice, console: &Console) -> Result<()> {
     console.print(format_args!(
@@ -322,9 +325,14 @@ fn print(device: &ListedDevice, console: &Console) -> Result<()> {
         return console.print(format_args!("no pass was recorded"));
     };
     let header: Vec<&str> = first.iter().map(|(name, _)| *name).collect();
-    let rows = cells.iter().map(|row| row.iter().map(|(_, text)| shown(text)).collect()).collect();
+    let told = cells.iter().take(MOST_PASSES);
+    let rows = told.map(|row| row.iter().map(|(_, text)| shown(text)).collect()).collect();
     console.print(format_args!("{}", table(&header, rows)))?;
-    for pass in &device.passes {
+    if let Some(more) = cells.len().checked_sub(MOST_PASSES).filter(|more| *more > 0) {
+        let more = grouped(more as u64);
+        console.print(format_args!("and {more} passes more: --json lists them all"))?;
+    }
+    for pass in device.passes.iter().take(MOST_PASSES) {
         let name = pass.target.as_ref().map_or("-".to_string(), |t| format!("#{}", t.number));
         for refusal in &pass.refused {
             console.print(format_args!(

@@ -176,7 +176,8 @@ wire_struct! {
 wire_struct! {
     /// A draw; the parts of a multi-draw are one each.
     Draw {
-        /// What its records carry; none else in the submission has the same.
+        /// What its records carry; none else in the submission has the same, but for draws that are
+        /// refused. `u32::MAX` where it leaves none.
         slot: u32,
         /// [`Pipeline::number`].
         pipeline: u64,

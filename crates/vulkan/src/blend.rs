@@ -116,14 +116,18 @@ pub(crate) fn rule(capture: &DeviceCapture, pass: &Pass, draw: &Draw) -> Result<
     let Some(colour) = &pass.colour else { return Err("it draws no colour".to_string()) };
     let image = &capture.images[&colour.image];
     let pipeline = &capture.pipelines[&draw.pipeline];
+    let Some(format) = PixelFormat::of(colour.format) else {
+        return Err(format!("its target's format {} is not known", name(colour.format)));
+    };
+    let mask = draw.state.mask & format.mask() & COLOURS;
+    if mask == 0 {
+        return Ok(Rule { format, what: What::Depth });
+    }
     for refused in [&draw.refused, &pipeline.refused] {
         if !refused.is_empty() {
             return Err(refused.clone());
         }
     }
-    let Some(format) = PixelFormat::of(colour.format) else {
-        return Err(format!("its target's format {} is not known", name(colour.format)));
-    };
     if format.kind == Kind::Integer {
         return Err(format!("its target holds whole numbers ({})", name(colour.format)));
     }
@@ -134,9 +138,7 @@ pub(crate) fn rule(capture: &DeviceCapture, pass: &Pass, draw: &Draw) -> Result<
         let (drawn, held) = (pipeline.samples, image.samples);
         return Err(format!("it draws {drawn} samples a pixel into an image of {held}"));
     }
-    let state = &draw.state;
-    let mask = state.mask & format.mask() & COLOURS;
-    let what = if mask == 0 { What::Depth } else { what(state, &format)? };
+    let what = what(&draw.state, &format)?;
     if !matches!(what, What::Depth) && mask != format.mask() & COLOURS {
         return Err(format!("it writes {} alone", channels(mask)));
     }
@@ -181,6 +183,10 @@ fn what(state: &State, format: &PixelFormat) -> Result<What, String> {
         };
     }
     let constants = state.constants.map(|v| format.clamped(v));
+    let [r, g, b, _] = constants.map(f64::from);
+    if destination.of == Of::Constant && grey(format, [r, g, b]).is_none() {
+        return Err(format!("{}: each channel has an alpha of its own", factors()));
+    }
     if source == one && destination.opposite() == one {
         return Ok(What::Opaque);
     }
@@ -204,7 +210,7 @@ impl Rule {
             What::Blend { source, alpha, constants } => (source, alpha, constants.map(f64::from)),
         };
         let shares = alpha.values(colour, constants);
-        let Some(share) = self.grey(shares) else { return Outcome::Coloured };
+        let Some(share) = grey(&self.format, shares) else { return Outcome::Coloured };
         if !(0.0..=1.0).contains(&share) {
             return Outcome::Beyond;
         }
@@ -226,16 +232,16 @@ impl Rule {
         let mask = self.format.mask();
         [0, 1, 2].map(|i| if mask >> i & 1 == 1 { rgb[i] } else { 0.0 })
     }
+}
 
-    /// The number that all channels have, where it is one.
-    fn grey(&self, values: [f64; 3]) -> Option<f64> {
-        let mask = self.format.mask();
-        let mut there = (0..3).filter(|i| mask >> i & 1 == 1).map(|i| values[i]);
-        let (low, high) =
-            there.clone().fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v), high.max(v)));
-        let middle = if mask >> 1 & 1 == 1 { values[1] } else { there.next_back()? };
-        (high - low <= GREY).then_some(middle)
-    }
+/// The number that all channels have, where it is one.
+fn grey(format: &PixelFormat, values: [f64; 3]) -> Option<f64> {
+    let mask = format.mask();
+    let mut there = (0..3).filter(|i| mask >> i & 1 == 1).map(|i| values[i]);
+    let (low, high) =
+        there.clone().fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v), high.max(v)));
+    let middle = if mask >> 1 & 1 == 1 { values[1] } else { there.next_back()? };
+    (high - low <= GREY).then_some(middle)
 }
 
 #[cfg(test)]
@@ -290,6 +296,9 @@ mod tests {
         let rule = of(&text, UNORM).unwrap();
         near(rule.apply([0.25; 4]), [0.75, 0.5, 0.25], 0.25);
         assert_eq!(rule.apply([0.25, 0.3, 0.25, 1.0]), Outcome::Coloured);
+        // A constant's channels are alike in all fragments of a draw, or in none.
+        text.destination = F::ONE_MINUS_CONSTANT_COLOR.as_raw();
+        assert!(of(&text, UNORM).unwrap_err().contains("an alpha of its own"));
     }
 
     #[test]

@@ -92,6 +92,7 @@ struct Redrawing<'a> {
     format: &'a PixelFormat,
     colours: Samples<[f32; 4]>,
     depths: DepthImages,
+    plan: Plan<'a>,
     reversed: bool,
     acts: Vec<Act<'a>>,
     done: usize,
@@ -119,12 +120,14 @@ impl Conversion<'_> {
         };
         let size = [self.header().width, self.header().height];
         let samples = self.program_samples as usize;
+        let plan = Plan::new(&self.chosen, false);
         let mut redrawing = Redrawing {
             conversion: self,
             format: &self.format,
             colours: Samples::new(size, samples, before),
             depths: DepthImages::new(),
-            reversed: Plan::new(&self.chosen, false).reversed().0,
+            reversed: plan.reversed().0,
+            plan,
             acts,
             done: 0,
         };
@@ -171,7 +174,7 @@ impl Conversion<'_> {
             match step.what {
                 Event::Pass(_) => acts.push(Act::Begin(pass, on)),
                 Event::Clear(c) => acts.push(Act::Clear(pass, c.depth, c.value, c.area, on)),
-                Event::Draw(draw) if self.is_recorded(draw) => {
+                Event::Draw(draw) if chosen.capture.is_recorded(draw) => {
                     let ordinals = by_submission.entry(step.submission).or_default();
                     ordinals.insert(draw.slot, acts.len() as u32);
                     total += chosen.count(step.submission, step.event);
@@ -183,27 +186,24 @@ impl Conversion<'_> {
         (acts, by_submission, total)
     }
 
-    fn is_recorded(&self, draw: &Draw) -> bool {
-        let pipeline = &self.chosen.capture.pipelines[&draw.pipeline];
-        draw.refused.is_empty() && pipeline.refused.is_empty()
-    }
-
     fn caveats(&self, acts: &[Act<'_>]) -> Vec<String> {
         let chosen = &self.chosen;
         let mut counted: BTreeMap<String, u64> = BTreeMap::new();
         let mut add = |what: String| *counted.entry(what).or_default() += 1;
         for act in acts {
-            if let Act::Draw(_, draw, true) = act
-                && let Some(what) = unknown(&draw.state)
-            {
+            let Act::Draw(pass, draw, true) = act else { continue };
+            if let Some(what) = unknown(&draw.state) {
                 add(format!("draws with {what}"));
+            }
+            if pass.layers > 1 {
+                add("draws into several layers or views at once".to_string());
             }
         }
         for step in chosen.frame.steps(chosen.capture) {
             let on = step.pass.and_then(|p| p.colour.as_ref());
             let on = on.is_some_and(|c| Place::from(c) == chosen.place);
             match step.what {
-                Event::Draw(draw) if on && !self.is_recorded(draw) => {
+                Event::Draw(draw) if on && !chosen.capture.is_recorded(draw) => {
                     add("draws that left no records".to_string());
                 }
                 Event::Write(w) if w.image == chosen.place.image => {
@@ -237,8 +237,10 @@ impl Conversion<'_> {
             None => return Err("its samples are not resolved by its last pass".to_string()),
         };
         let picture = after(chosen.capture, Place::from(shown), submission);
-        let none = "the program's picture was not taken: capture with --check";
-        picture.map(|p| (shown, p)).ok_or_else(|| none.to_string())
+        picture.map(|p| (shown, p)).ok_or_else(|| match chosen.capture.pictures.is_empty() {
+            true => "no picture of the program's was taken: capture with --check".to_string(),
+            false => format!("there is no picture of it after submission {submission}"),
+        })
     }
 
     /// What the target held at first.
@@ -314,7 +316,13 @@ impl Redrawing<'_> {
                         self.colours.clear(pass.area, self.format.stored(colour.clear));
                     }
                     if let Some(depth) = pass.depth.as_ref().filter(|d| clears(d)) {
-                        self.image(depth).clear(pass.area, depth.clear[0]);
+                        let place = Place::from(depth);
+                        let size = self.conversion.chosen.capture.size(place);
+                        let is_known =
+                            covers(pass.area, size) && !self.plan.unrecorded.contains(&place);
+                        let image = self.image(depth);
+                        image.clear(pass.area, depth.clear[0]);
+                        image.set_known(is_known);
                     }
                 }
                 Act::Clear(_, false, value, area, on) => {

@@ -41,12 +41,19 @@ pub(crate) struct DepthImage {
     format: i32,
     positions: Vec<[i8; 2]>,
     held: Samples<f32>,
+    /// Whether all that was drawn into it is known since it was cleared.
+    is_known: bool,
 }
 
 impl DepthImage {
     pub(crate) fn new(size: [u32; 2], format: i32, positions: &[[i8; 2]], cleared: f32) -> Self {
         let held = Samples::new(size, positions.len(), Box::new(move |_, _| cleared));
-        DepthImage { format, positions: positions.to_vec(), held }
+        DepthImage { format, positions: positions.to_vec(), held, is_known: false }
+    }
+
+    /// Says whether all that is drawn into it from now on is known.
+    pub(crate) fn set_known(&mut self, is_known: bool) {
+        self.is_known = is_known;
     }
 
     /// Clears an area.
@@ -66,9 +73,11 @@ impl DepthImage {
         if !state.depth_test {
             return coverage;
         }
-        let op = match vk::CompareOp::from_raw(state.depth_op) {
-            // What was drawn before for its depth alone may have left no record: what is nearest
-            // is the same by this.
+        let op = vk::CompareOp::from_raw(state.depth_op);
+        let op = match op {
+            // Where what was drawn before for its depth alone has left no records, what is nearest
+            // has the depth that is asked for.
+            vk::CompareOp::EQUAL if self.is_known => op,
             vk::CompareOp::EQUAL if reversed => vk::CompareOp::GREATER_OR_EQUAL,
             vk::CompareOp::EQUAL => vk::CompareOp::LESS_OR_EQUAL,
             op => op,
@@ -111,10 +120,11 @@ pub(crate) fn plane(record: &Record, reversed: bool) -> (DepthPlane, bool) {
     let whole = |v: f64| (v * f64::from(u32::MAX)).round();
     let fits = |slope: f64| whole(slope).abs() <= f64::from(i32::MAX);
     let inside = (0.0..=1.0).contains(&z) && fits(dx) && fits(dy);
+    let is_flat = !inside && (dx, dy) != (0.0, 0.0) || z.is_nan();
     let [dx, dy] = if inside { [dx, dy].map(|v| whole(v) as i32) } else { [0, 0] };
     // What is no number becomes 0.
     let z = Unorm32(whole(z.clamp(0.0, 1.0)) as u32);
-    (DepthPlane { z, dzdx: dx, dzdy: dy }, !inside)
+    (DepthPlane { z, dzdx: dx, dzdy: dy }, is_flat)
 }
 
 #[cfg(test)]
@@ -139,6 +149,9 @@ mod tests {
             let (p, flat) = plane(&record(z, slopes), false);
             assert!(flat && p.dzdx == 0 && p.dzdy == 0, "{z}");
         }
+        // As a depth image clamps it.
+        let (p, flat) = plane(&record(1.5, [0.0; 2]), false);
+        assert_eq!((p.z, flat), (Unorm32::FAR, false));
     }
 
     #[test]
@@ -160,8 +173,12 @@ mod tests {
             image.test(&record(0.9, [0.0; 2]), 3, &test(vk::CompareOp::NEVER, true), true),
             0
         );
-        // Equal stands for what is nearest.
+        // Equal stands for what is nearest, until all is known.
         let equal = test(vk::CompareOp::EQUAL, false);
+        assert_eq!(image.test(&record(0.8, [0.0; 2]), 3, &equal, false), 1);
+        assert_eq!(image.test(&record(0.8, [0.0; 2]), 3, &equal, true), 2);
+        image.set_known(true);
+        assert_eq!(image.test(&record(0.8, [0.0; 2]), 3, &equal, false), 0);
         assert_eq!(image.test(&record(0.9, [0.0; 2]), 3, &equal, false), 1);
     }
 }

@@ -7,14 +7,17 @@ use std::path::{Path, PathBuf};
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::trace::MAX_SIDE;
 use screendoor_vulkan_layer::log::{
-    self, Attachment, Device, Entry, Event, Files, Image, MAGIC, Pass, Picture, Pipeline, Present,
-    RECORD_BYTES, Submission,
+    self, Attachment, Device, Draw, Entry, Event, Files, Image, MAGIC, Pass, Picture, Pipeline,
+    Present, RECORD_BYTES, Submission,
 };
 
 use crate::target::Place;
 
 /// What to do about files that cannot be right.
 const HINT: &str = "capture anew; files of a layer of another version cannot be read";
+
+/// The slot of a draw that leaves no records.
+const NO_SLOT: u32 = u32::MAX;
 
 /// What the layer recorded of a program: of each device of each of its processes.
 #[derive(Debug)]
@@ -227,7 +230,7 @@ impl DeviceCapture {
                         let (slot, pipeline) = (draw.slot, draw.pipeline);
                         return bad(format!("draw {slot} has the unknown pipeline {pipeline}"));
                     }
-                    if !slots.insert(draw.slot) {
+                    if self.is_recorded(draw) && !slots.insert(draw.slot) {
                         return bad(format!("there are two draws {}", draw.slot));
                     }
                 }
@@ -239,6 +242,11 @@ impl DeviceCapture {
             }
         }
         Ok(())
+    }
+
+    /// Whether a draw's records are there to be used.
+    pub(crate) fn is_recorded(&self, draw: &Draw) -> bool {
+        draw.refused.is_empty() && self.pipelines[&draw.pipeline].refused.is_empty()
     }
 
     /// What is wrong with an attachment.
@@ -258,10 +266,10 @@ impl DeviceCapture {
         [image.width, image.height].map(|side| (side >> place.level).max(1))
     }
 
-    /// Which event of a submission each slot is.
+    /// Which event of a submission each slot is. Where several draws have one, they are refused.
     pub(crate) fn slots(submission: &Submission) -> HashMap<u32, usize> {
         let slot = |(i, event): (usize, &Event)| match event {
-            Event::Draw(draw) => Some((draw.slot, i)),
+            Event::Draw(draw) if draw.slot != NO_SLOT => Some((draw.slot, i)),
             _ => None,
         };
         submission.events.iter().enumerate().filter_map(slot).collect()

@@ -9,6 +9,7 @@ use crate::convert::{Conversion, Dropped, Object};
 use crate::depth::{DepthImage, DepthImages, DepthRule, plane};
 use crate::plan::{Act, Plan, Planned};
 use crate::records::FRONT;
+use crate::samples::covers;
 use crate::target::Place;
 
 type Push<'a> = &'a mut dyn FnMut(&Fragment) -> Result<()>;
@@ -216,8 +217,13 @@ impl<'a> Making<'a> {
                 Act::Begin(pass, depth) => {
                     let clears = depth.load == ash::vk::AttachmentLoadOp::CLEAR.as_raw();
                     if clears && self.depth == DepthRule::Order {
-                        let (area, value) = (pass.area, depth.clear[0]);
-                        self.image((*depth).into(), depth.format).clear(area, value);
+                        let place = Place::from(*depth);
+                        let capture = self.conversion.chosen.capture;
+                        let is_known = covers(pass.area, capture.size(place))
+                            && !self.plan.unrecorded.contains(&place);
+                        let image = self.image(place, depth.format);
+                        image.clear(pass.area, depth.clear[0]);
+                        image.set_known(is_known);
                     }
                 }
                 Act::ClearDepth(place, area, value) => {

@@ -149,6 +149,9 @@ mod tests {
         let place = tempfile::tempdir().unwrap();
         let mut command = std::process::Command::new("sleep");
         let mut child = command.arg("60").env("X", place.path()).spawn().unwrap();
+        // The system may take a moment to show what a new process was given.
+        let pause = || std::thread::sleep(std::time::Duration::from_millis(20));
+        (0..500).take_while(|_| !is_ours(child.id(), place.path())).for_each(|_| pause());
         assert!(is_ours(child.id(), place.path()));
         assert!(!is_ours(child.id(), Path::new("/no/such/folder")));
         terminate(child.id());

@@ -82,6 +82,8 @@ pub(crate) struct Plan<'a> {
     pub writes: BTreeMap<(bool, String), u64>,
     /// The submission of the last write before the first draw.
     pub written: Option<usize>,
+    /// Depth images that draws write to of which there are no records.
+    pub unrecorded: BTreeSet<Place>,
     /// Colour attachments beside the target at most.
     pub others: u32,
     /// The attachment as the first draw uses it.
@@ -101,6 +103,7 @@ impl<'a> Plan<'a> {
             partial_clears: 0,
             writes: BTreeMap::new(),
             written: None,
+            unrecorded: BTreeSet::new(),
             others: 0,
             attachment: None,
         };
@@ -256,6 +259,9 @@ impl<'a> Plan<'a> {
         }
         let place = pass.depth.as_ref().map(Place::from);
         let is_depth = draw.state.depth_test && draw.state.depth_write;
+        if is_depth && !chosen.capture.is_recorded(draw) {
+            self.unrecorded.extend(place);
+        }
         let for_depth = is_depth && place.is_some_and(|p| shared.contains(&p));
         if rule.is_some() || for_depth {
             let submission = step.submission;

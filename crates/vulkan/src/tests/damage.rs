@@ -113,6 +113,16 @@ fn what_is_named_has_to_be_known() {
         assert!(said.contains(says), "{said}");
         assert!(said.contains(", submission 0: "), "{said}");
     }
+    // Those of which no records are used may share one.
+    let refused = || draw(Draw { refused: "twice".into(), ..over(5) });
+    let none = || draw(Draw { refused: "none".into(), ..over(u32::MAX) });
+    let mut made = Made::new();
+    let records = vec![grey(5, 0, 0.5), grey(6, 0, 0.5)];
+    made.submit(vec![begun(), refused(), refused(), none(), none(), draw(over(6))], records);
+    made.write();
+    try_all(&made).unwrap();
+    let said = error(vec![begun(), none()], vec![grey(u32::MAX, 0, 0.5)]);
+    assert!(said.contains("a record of draw 4294967295"), "{said}");
     let said = error(vec![begun(), draw(over(5))], vec![grey(6, 0, 0.5)]);
     assert!(said.contains("a record of draw 6, which its log does not have"), "{said}");
     let said = error(vec![begun(), draw(over(5))], vec![grey(5, 4, 0.5)]);
