@@ -38,3 +38,4 @@ mod trace_file;
 mod unbiased;
 mod util;
 mod view;
+mod vulkan;
