@@ -6,10 +6,10 @@ use screendoor_vulkan_layer::log::Record;
 
 use crate::blend::Outcome;
 use crate::convert::{Conversion, Dropped, Object};
-use crate::depth::{DepthImage, DepthImages, DepthRule, plane};
+use crate::depth::{DepthRule, plane};
+use crate::depth_images::DepthImages;
 use crate::plan::{Act, Plan, Planned};
 use crate::records::FRONT;
-use crate::samples::covers;
 use crate::target::Place;
 
 type Push<'a> = &'a mut dyn FnMut(&Fragment) -> Result<()>;
@@ -26,7 +26,7 @@ pub(crate) struct Making<'a> {
     step: u64,
     /// The greatest number that a colour may be.
     most: f64,
-    images: DepthImages,
+    images: DepthImages<'a>,
     /// Acts that are done.
     done: usize,
     /// Records of one primitive in one pixel.
@@ -70,7 +70,7 @@ impl<'a> Making<'a> {
                 ColourFormat::F16 => 65504.0,
                 ColourFormat::F32 => f32::MAX.into(),
             },
-            images: DepthImages::new(),
+            images: DepthImages::new(&conversion.chosen, plan),
             done: 0,
             group: Vec::new(),
             primitive: is_painted.into(),
@@ -143,7 +143,7 @@ impl<'a> Making<'a> {
         // Pieces that share a number cover none of each other's samples.
         let mut layers: Vec<(u64, Vec<Piece>)> = Vec::new();
         for record in &group {
-            let Some(coverage) = self.tested(planned, record) else { continue };
+            let Some(coverage) = self.tested(planned, record)? else { continue };
             let layer = layers.iter().position(|(covered, _)| covered & coverage == 0);
             let layer = layer.unwrap_or_else(|| {
                 layers.push((0, Vec::new()));
@@ -172,7 +172,7 @@ impl<'a> Making<'a> {
 
     /// The samples of a record that are drawn; `None` where there are none, or where the draw is
     /// looked at for its depths alone.
-    fn tested(&mut self, planned: &Planned<'_>, record: &Record) -> Option<u64> {
+    fn tested(&mut self, planned: &Planned<'_>, record: &Record) -> Result<Option<u64>> {
         let is_kept = planned.rule.is_some();
         let samples = match &planned.pass.colour {
             // Another target's samples may be more.
@@ -182,31 +182,19 @@ impl<'a> Making<'a> {
         let mut coverage = u64::from(record.coverage & !FRONT) & samples;
         if coverage == 0 {
             self.dropped.uncovered += u64::from(is_kept);
-            return None;
+            return Ok(None);
         }
         if self.depth == DepthRule::Order
             && let Some(depth) = planned.tested()
         {
-            let reversed = self.reversed;
-            let image = self.image(depth.into(), depth.format);
-            coverage = image.test(record, coverage, &planned.draw.state, reversed);
+            let draw = (planned.at, planned.draw);
+            coverage = self.images.test(draw, depth, record, coverage)?;
             if coverage == 0 {
                 self.dropped.hidden += u64::from(is_kept);
-                return None;
+                return Ok(None);
             }
         }
-        is_kept.then_some(coverage)
-    }
-
-    fn image(&mut self, place: Place, format: i32) -> &mut DepthImage {
-        let capture = self.conversion.chosen.capture;
-        let far = if self.reversed { 0.0 } else { 1.0 };
-        self.images.entry(place).or_insert_with(|| {
-            let samples = capture.images[&place.image].samples;
-            let pattern = screendoor_trace::trace::SamplePattern::standard(samples);
-            let positions = pattern.map_or_else(|| vec![[0, 0]], |p| p.positions);
-            DepthImage::new(capture.size(place), format, &positions, far)
-        })
+        Ok(is_kept.then_some(coverage))
     }
 
     /// Does what comes before an act.
@@ -214,23 +202,8 @@ impl<'a> Making<'a> {
         while self.done < act {
             match &self.plan.acts[self.done] {
                 Act::Draw(_) => {}
-                Act::Begin(pass, depth) => {
-                    let clears = depth.load == ash::vk::AttachmentLoadOp::CLEAR.as_raw();
-                    if clears && self.depth == DepthRule::Order {
-                        let place = Place::from(*depth);
-                        let capture = self.conversion.chosen.capture;
-                        let is_known = covers(pass.area, capture.size(place))
-                            && !self.plan.unrecorded.contains(&place);
-                        let image = self.image(place, depth.format);
-                        image.clear(pass.area, depth.clear[0]);
-                        image.set_known(is_known);
-                    }
-                }
-                Act::ClearDepth(place, area, value) => {
-                    if let Some(image) = self.images.get_mut(place) {
-                        image.clear(*area, *value);
-                    }
-                }
+                Act::Begin(pass, _) => self.images.begin(pass),
+                Act::ClearDepth(depth, area, value) => self.images.clear(depth, *area, *value),
             }
             self.done += 1;
         }
