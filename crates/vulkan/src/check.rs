@@ -200,7 +200,9 @@ impl Conversion<'_> {
             let on = on.is_some_and(|c| Place::from(c) == chosen.place);
             match step.what {
                 Event::Draw(draw) if on && !chosen.capture.is_recorded(draw) => {
-                    add("draws that left no records".to_string());
+                    let is_seen = draw.state.mask & self.format.mask() != 0;
+                    let which = if is_seen { "draws" } else { "draws of depth alone" };
+                    add(format!("{which} that left no records"));
                 }
                 Event::Write(w) if w.image == chosen.place.image => {
                     add(format!("writes by {}", w.command));

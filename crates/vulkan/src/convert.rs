@@ -89,7 +89,7 @@ impl Refusal {
 }
 
 /// An object of a trace, which is a draw.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+#[derive(Clone, PartialEq, Eq, Debug, Default, Serialize)]
 pub struct Object {
     /// Its number in the trace.
     pub object: u32,

@@ -4,12 +4,14 @@ use screendoor_trace::error::{Error, Result};
 use screendoor_trace::trace::{ColourFormat, DepthPlane, Fragment, SampleMask, Unorm32};
 use screendoor_vulkan_layer::log::Record;
 
+use crate::background::rgb;
 use crate::blend::Outcome;
 use crate::convert::{Conversion, Dropped, Object};
 use crate::depth::{DepthRule, plane};
 use crate::depth_images::DepthImages;
 use crate::plan::{Act, Plan, Planned};
 use crate::records::FRONT;
+use crate::samples::Area;
 use crate::target::Place;
 
 type Push<'a> = &'a mut dyn FnMut(&Fragment) -> Result<()>;
@@ -56,7 +58,7 @@ impl<'a> Making<'a> {
         depth: DepthRule,
         is_painted: bool,
     ) -> Self {
-        let records: u64 = plan.kept().map(|p| p.records).sum();
+        let records: u64 = plan.kept().map(|p| p.records).sum::<u64>() + plan.partial_clears;
         // A power of two, so that narrower depths tell as many apart as they can.
         let step = (u64::from(u32::MAX) - 1) / (records + 2);
         Making {
@@ -102,6 +104,8 @@ impl<'a> Making<'a> {
     /// Ends with the last record.
     pub(crate) fn finish(mut self, push: Push<'_>) -> Result<(Dropped, Vec<Object>)> {
         self.flush(push)?;
+        self.primitive += std::mem::take(&mut self.used);
+        self.catch_up(self.plan.acts.len(), push)?;
         Ok((self.dropped, self.objects))
     }
 
@@ -136,7 +140,7 @@ impl<'a> Making<'a> {
     fn flush(&mut self, push: Push<'_>) -> Result<()> {
         let group = std::mem::take(&mut self.group);
         let Some(act) = group.first().map(|r| r.slot) else { return Ok(()) };
-        self.catch_up(act as usize);
+        self.catch_up(act as usize, push)?;
         let Some(planned) = self.planned(act) else { return Ok(()) };
         let per_sample =
             self.conversion.chosen.capture.pipelines[&planned.draw.pipeline].per_sample;
@@ -198,15 +202,72 @@ impl<'a> Making<'a> {
     }
 
     /// Does what comes before an act.
-    fn catch_up(&mut self, act: usize) {
+    fn catch_up(&mut self, act: usize, push: Push<'_>) -> Result<()> {
         while self.done < act {
             match &self.plan.acts[self.done] {
                 Act::Draw(_) => {}
                 Act::Begin(pass, _) => self.images.begin(pass),
                 Act::ClearDepth(depth, area, value) => self.images.clear(depth, *area, *value),
+                Act::Paint(area, colour) => self.paint(*area, *colour, push)?,
             }
             self.done += 1;
         }
+        Ok(())
+    }
+
+    /// Covers a part of the frame with a colour, where the order of drawing decides.
+    fn paint(&mut self, area: Area, colour: [f32; 4], push: Push<'_>) -> Result<()> {
+        if self.depth != DepthRule::Order {
+            return Ok(());
+        }
+        let primitive = self.number(0)?;
+        let depth = self.ordered(0);
+        self.primitive += 1;
+        self.object = None;
+        let object = self
+            .new_object(Object { command: "a clear of a part".to_string(), ..Object::default() });
+        let header = self.conversion.header();
+        let colour = rgb(self.conversion.format.stored(colour));
+        let sides = |from: i32, length: i32, most: u32| {
+            let within = |at: i64| at.clamp(0, most.into()) as u32;
+            within(from.into())..within(i64::from(from) + i64::from(length))
+        };
+        let [left, upper, width, height] = area;
+        for y in sides(upper, height, header.height) {
+            for x in sides(left, width, header.width) {
+                self.count();
+                push(&Fragment {
+                    x: x as u16,
+                    y: y as u16,
+                    coverage: SampleMask(self.samples),
+                    depth,
+                    colour,
+                    alpha: 1.0,
+                    primitive,
+                    object,
+                    ..Fragment::default()
+                })?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The number in the trace of a layer of the primitive.
+    fn number(&self, layer: u64) -> Result<u32> {
+        u32::try_from(self.primitive + layer).map_err(|_| {
+            Error::unsupported(
+                &self.conversion.header().source,
+                "more than 2^32 primitives leave fragments",
+                "capture less at a time, with --submits",
+            )
+        })
+    }
+
+    /// The depth of a layer of the primitive by the order of drawing.
+    fn ordered(&self, layer: u64) -> DepthPlane {
+        let back = u64::from(u32::MAX) - 1;
+        let z = back.saturating_sub((self.primitive + layer) * self.step) as u32;
+        DepthPlane { z: Unorm32(z), dzdx: 0, dzdy: 0 }
     }
 
     fn emit(
@@ -235,21 +296,10 @@ impl<'a> Making<'a> {
             }
         };
         self.dropped.not_finite += u64::from(!is_finite);
-        let number = self.primitive + layer;
-        let Ok(primitive) = u32::try_from(number) else {
-            return Err(Error::unsupported(
-                &self.conversion.header().source,
-                "more than 2^32 primitives leave fragments",
-                "capture less at a time, with --submits",
-            ));
-        };
+        let primitive = self.number(layer)?;
         self.used = self.used.max(layer + 1);
         let depth = match self.depth {
-            DepthRule::Order => {
-                let back = u64::from(u32::MAX) - 1;
-                let z = back.saturating_sub(number * self.step) as u32;
-                DepthPlane { z: Unorm32(z), dzdx: 0, dzdy: 0 }
-            }
+            DepthRule::Order => self.ordered(layer),
             _ => {
                 let (plane, flat) = plane(&piece.record, self.reversed);
                 self.dropped.flattened += u64::from(flat);
@@ -271,26 +321,32 @@ impl<'a> Making<'a> {
         })
     }
 
-    /// The number of the draw's object.
+    /// The number of the draw's object, which has one fragment more.
     fn object(&mut self, planned: &Planned<'_>, act: u32) -> u32 {
         if self.object != Some(act) {
             self.object = Some(act);
             let pipelines = &self.conversion.chosen.capture.pipelines;
-            self.objects.push(Object {
-                object: self.first_object + self.objects.len() as u32,
+            self.new_object(Object {
                 label: planned.draw.label.clone(),
                 command: planned.draw.command.clone(),
                 pipeline: pipelines[&planned.draw.pipeline].name.clone(),
-                fragments: 0,
+                ..Object::default()
             });
         }
-        match self.objects.last_mut() {
-            Some(object) => {
-                object.fragments += 1;
-                object.object
-            }
-            None => 0,
-        }
+        self.count();
+        self.objects.last().map_or(0, |object| object.object)
+    }
+
+    /// Gives an object its number.
+    fn new_object(&mut self, object: Object) -> u32 {
+        let number = self.first_object + self.objects.len() as u32;
+        self.objects.push(Object { object: number, ..object });
+        number
+    }
+
+    /// The last object has one fragment more.
+    fn count(&mut self) {
+        self.objects.iter_mut().next_back().into_iter().for_each(|object| object.fragments += 1);
     }
 }
 

@@ -30,6 +30,8 @@ pub(crate) enum Act<'a> {
     /// A part of a depth image is cleared.
     ClearDepth(&'a Attachment, Area, f32),
     Draw(Planned<'a>),
+    /// A part of the target is cleared to a colour.
+    Paint(Area, [f32; 4]),
 }
 
 /// A draw that is looked at.
@@ -150,19 +152,25 @@ impl<'a> Plan<'a> {
             Act::Draw(planned) => {
                 planned.records > 0 && (planned.rule.is_some() || planned.for_depth)
             }
-            Act::Begin(..) | Act::ClearDepth(..) => true,
+            Act::Begin(..) | Act::ClearDepth(..) | Act::Paint(..) => true,
         });
         plan
     }
 
     /// All that was drawn is gone.
     fn reset(&mut self, base: Base, since: &mut usize) {
-        for act in &mut self.acts[*since..] {
-            if let Act::Draw(planned) = act
-                && planned.rule.take().is_some()
-            {
-                self.painted_over.add(planned.records);
+        let gone = self.acts.split_off(*since);
+        for mut act in gone {
+            match &mut act {
+                Act::Paint(..) => continue,
+                Act::Draw(planned) => {
+                    if planned.rule.take().is_some() {
+                        self.painted_over.add(planned.records);
+                    }
+                }
+                Act::Begin(..) | Act::ClearDepth(..) => {}
             }
+            self.acts.push(act);
         }
         let refused = std::mem::take(&mut self.refused).into_values();
         for [draws, fragments] in refused {
@@ -194,7 +202,7 @@ impl<'a> Plan<'a> {
                 self.reset(Base::Cleared(colour.clear), since);
                 self.partial_clears += u64::from(!is_whole);
             }
-            vk::AttachmentLoadOp::CLEAR => self.partial_clears += 1,
+            vk::AttachmentLoadOp::CLEAR => self.paint(pass.area, colour.clear),
             vk::AttachmentLoadOp::DONT_CARE if is_whole || !begun => {
                 self.reset(Base::Undefined, since);
             }
@@ -222,8 +230,13 @@ impl<'a> Plan<'a> {
         } else if on && covers(clear.area, chosen.capture.size(chosen.place)) {
             self.reset(Base::Cleared(clear.value), since);
         } else if on {
-            self.partial_clears += 1;
+            self.paint(clear.area, clear.value);
         }
+    }
+
+    fn paint(&mut self, area: Area, colour: [f32; 4]) {
+        self.partial_clears += 1;
+        self.acts.push(Act::Paint(area, colour));
     }
 
     fn write(&mut self, step: &Step<'_>, command: String) {
