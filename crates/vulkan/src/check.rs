@@ -6,15 +6,15 @@ use std::rc::Rc;
 use ash::vk;
 use screendoor_trace::error::Result;
 use screendoor_trace::picture::srgb;
-use screendoor_trace::trace::SamplePattern;
 use screendoor_vulkan_layer::log::{Attachment, Draw, Event, Pass, Picture, Record};
 use serde::Serialize;
 
 use crate::background::{after, each_pixel};
 use crate::convert::Conversion;
-use crate::depth::{DepthImage, DepthImages};
+use crate::depth_images::DepthImages;
 use crate::equation::{blend, unknown};
 use crate::format::{Kind, PixelFormat};
+use crate::frame::At;
 use crate::plan::{Base, Plan, shared};
 use crate::records::{FRONT, Records};
 use crate::samples::{Samples, covers};
@@ -83,7 +83,7 @@ impl Check {
 enum Act<'a> {
     Begin(&'a Pass, bool),
     Clear(&'a Pass, bool, [f32; 4], [i32; 4], bool),
-    Draw(&'a Pass, &'a Draw, bool),
+    Draw(At, &'a Pass, &'a Draw, bool),
 }
 
 /// The target under reconstruction.
@@ -91,9 +91,7 @@ struct Redrawing<'a> {
     conversion: &'a Conversion<'a>,
     format: &'a PixelFormat,
     colours: Samples<[f32; 4]>,
-    depths: DepthImages,
-    plan: Plan<'a>,
-    reversed: bool,
+    depths: DepthImages<'a>,
     acts: Vec<Act<'a>>,
     done: usize,
 }
@@ -125,9 +123,7 @@ impl Conversion<'_> {
             conversion: self,
             format: &self.format,
             colours: Samples::new(size, samples, before),
-            depths: DepthImages::new(),
-            reversed: plan.reversed().0,
-            plan,
+            depths: DepthImages::new(&self.chosen, &plan),
             acts,
             done: 0,
         };
@@ -135,7 +131,7 @@ impl Conversion<'_> {
         for (submission, ordinals) in by_submission {
             let records = Records::of(capture, &capture.submissions[submission]);
             records.in_order(&ordinals, self.options.memory, &mut |record| {
-                redrawing.take(&record);
+                redrawing.take(&record)?;
                 done += 1;
                 if done % (1 << 16) == 0 || done == total {
                     progress(done, total);
@@ -175,10 +171,10 @@ impl Conversion<'_> {
                 Event::Pass(_) => acts.push(Act::Begin(pass, on)),
                 Event::Clear(c) => acts.push(Act::Clear(pass, c.depth, c.value, c.area, on)),
                 Event::Draw(draw) if chosen.capture.is_recorded(draw) => {
-                    let ordinals = by_submission.entry(step.submission).or_default();
+                    let ordinals = by_submission.entry(step.at.submission).or_default();
                     ordinals.insert(draw.slot, acts.len() as u32);
-                    total += chosen.count(step.submission, step.event);
-                    acts.push(Act::Draw(pass, draw, on));
+                    total += chosen.count(step.at);
+                    acts.push(Act::Draw(step.at, pass, draw, on));
                 }
                 Event::Draw(_) | Event::Write(_) => {}
             }
@@ -191,7 +187,7 @@ impl Conversion<'_> {
         let mut counted: BTreeMap<String, u64> = BTreeMap::new();
         let mut add = |what: String| *counted.entry(what).or_default() += 1;
         for act in acts {
-            let Act::Draw(pass, draw, true) = act else { continue };
+            let Act::Draw(_, pass, draw, true) = act else { continue };
             if let Some(what) = unknown(&draw.state) {
                 add(format!("draws with {what}"));
             }
@@ -204,7 +200,9 @@ impl Conversion<'_> {
             let on = on.is_some_and(|c| Place::from(c) == chosen.place);
             match step.what {
                 Event::Draw(draw) if on && !chosen.capture.is_recorded(draw) => {
-                    add("draws that left no records".to_string());
+                    let is_seen = draw.state.mask & self.format.mask() != 0;
+                    let which = if is_seen { "draws" } else { "draws of depth alone" };
+                    add(format!("{which} that left no records"));
                 }
                 Event::Write(w) if w.image == chosen.place.image => {
                     add(format!("writes by {}", w.command));
@@ -224,7 +222,7 @@ impl Conversion<'_> {
                 && let Some(colour) = pass.colour.as_ref()
                 && Place::from(colour) == chosen.place
             {
-                last = Some((pass, colour, chosen.capture.submissions[step.submission].number));
+                last = Some((pass, colour, chosen.capture.submissions[step.at.submission].number));
             }
         }
         let Some((pass, colour, submission)) = last else {
@@ -294,18 +292,6 @@ impl Conversion<'_> {
 }
 
 impl Redrawing<'_> {
-    fn image(&mut self, depth: &Attachment) -> &mut DepthImage {
-        let capture = self.conversion.chosen.capture;
-        let far = if self.reversed { 0.0 } else { 1.0 };
-        let place = Place::from(depth);
-        self.depths.entry(place).or_insert_with(|| {
-            let samples = capture.images[&place.image].samples;
-            let positions =
-                SamplePattern::standard(samples).map_or_else(|| vec![[0, 0]], |p| p.positions);
-            DepthImage::new(capture.size(place), depth.format, &positions, far)
-        })
-    }
-
     fn catch_up(&mut self, act: usize) {
         while self.done < act {
             match self.acts[self.done] {
@@ -315,15 +301,7 @@ impl Redrawing<'_> {
                     if let Some(colour) = pass.colour.as_ref().filter(|c| on && clears(c)) {
                         self.colours.clear(pass.area, self.format.stored(colour.clear));
                     }
-                    if let Some(depth) = pass.depth.as_ref().filter(|d| clears(d)) {
-                        let place = Place::from(depth);
-                        let size = self.conversion.chosen.capture.size(place);
-                        let is_known =
-                            covers(pass.area, size) && !self.plan.unrecorded.contains(&place);
-                        let image = self.image(depth);
-                        image.clear(pass.area, depth.clear[0]);
-                        image.set_known(is_known);
-                    }
+                    self.depths.begin(pass);
                 }
                 Act::Clear(_, false, value, area, on) => {
                     if on {
@@ -332,7 +310,7 @@ impl Redrawing<'_> {
                 }
                 Act::Clear(pass, true, value, area, _) => {
                     if let Some(depth) = &pass.depth {
-                        self.image(depth).clear(area, value[0]);
+                        self.depths.clear(depth, area, value[0]);
                     }
                 }
             }
@@ -340,22 +318,17 @@ impl Redrawing<'_> {
         }
     }
 
-    fn take(&mut self, record: &Record) {
+    fn take(&mut self, record: &Record) -> Result<()> {
         let act = record.slot as usize;
         self.catch_up(act);
-        let Act::Draw(pass, draw, on) = self.acts[act] else { return };
+        let Act::Draw(at, pass, draw, on) = self.acts[act] else { return Ok(()) };
         let mut coverage = u64::from(record.coverage & !FRONT);
         if let Some(depth) = pass.depth.as_ref().filter(|_| draw.state.depth_test) {
-            let [width, height] = self.conversion.chosen.capture.size(Place::from(depth));
-            if record.x() >= width || record.y() >= height {
-                return;
-            }
-            let reversed = self.reversed;
-            coverage = self.image(depth).test(record, coverage, &draw.state, reversed);
+            coverage = self.depths.test((at, draw), depth, record, coverage)?;
         }
         let header = self.conversion.header();
         if !on || record.x() >= header.width || record.y() >= header.height {
-            return;
+            return Ok(());
         }
         let format = self.format;
         let samples = self.colours.at(record.x() as u16, record.y() as u16);
@@ -364,6 +337,7 @@ impl Redrawing<'_> {
                 *held = blend(&draw.state, format, record.colour, *held);
             }
         }
+        Ok(())
     }
 
     /// The mean of a pixel's samples.

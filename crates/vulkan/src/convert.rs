@@ -127,7 +127,7 @@ impl Refusal {
 }
 
 /// An object of a trace, which is a draw.
-#[derive(Clone, PartialEq, Eq, Debug, Serialize)]
+#[derive(Clone, PartialEq, Eq, Debug, Default, Serialize)]
 pub struct Object {
     /// Its number in the trace.
     pub object: u32,
@@ -298,7 +298,7 @@ impl<'a> Conversion<'a> {
         let mut by_submission: BTreeMap<usize, HashMap<u32, u32>> = BTreeMap::new();
         let mut total = 0;
         for (act, planned) in draws {
-            by_submission.entry(planned.submission).or_default().insert(planned.draw.slot, act);
+            by_submission.entry(planned.at.submission).or_default().insert(planned.draw.slot, act);
             total += planned.records;
         }
         let mut done = 0;

@@ -1,14 +1,11 @@
 //! Depth: the program's own tests, sample by sample, and planes as a trace has them.
 
-use std::collections::BTreeMap;
-
 use ash::vk;
 use screendoor_trace::trace::{DepthPlane, Unorm32};
 use screendoor_vulkan_layer::log::{Record, State};
 
 use crate::format::stored_depth;
 use crate::samples::{Area, Samples};
-use crate::target::Place;
 
 screendoor_trace::options! {
     /// What the depths of a trace are.
@@ -41,8 +38,9 @@ pub(crate) struct DepthImage {
     format: i32,
     positions: Vec<[i8; 2]>,
     held: Samples<f32>,
-    /// Whether all that was drawn into it is known since it was cleared.
-    is_known: bool,
+    /// Whether what it holds can be equal to what is drawn: since it was cleared all that was drawn
+    /// into it is known, or has been found out.
+    pub(crate) is_known: bool,
 }
 
 impl DepthImage {
@@ -51,44 +49,20 @@ impl DepthImage {
         DepthImage { format, positions: positions.to_vec(), held, is_known: false }
     }
 
-    /// Says whether all that is drawn into it from now on is known.
-    pub(crate) fn set_known(&mut self, is_known: bool) {
-        self.is_known = is_known;
-    }
-
     /// Clears an area.
     pub(crate) fn clear(&mut self, area: Area, value: f32) {
         self.held.clear(area, stored_depth(self.format, value));
     }
 
     /// Of the samples of `coverage` those that pass the test of `state`; their depths are written
-    /// where it writes any.
-    pub(crate) fn test(
-        &mut self,
-        record: &Record,
-        coverage: u64,
-        state: &State,
-        reversed: bool,
-    ) -> u64 {
+    /// where it writes any. What lies beside the image passes none.
+    pub(crate) fn test(&mut self, record: &Record, coverage: u64, state: &State) -> u64 {
         if !state.depth_test {
             return coverage;
         }
-        let op = vk::CompareOp::from_raw(state.depth_op);
-        let op = match op {
-            // Where what was drawn before for its depth alone has left no records, what is nearest
-            // has the depth that is asked for.
-            vk::CompareOp::EQUAL if self.is_known => op,
-            vk::CompareOp::EQUAL if reversed => vk::CompareOp::GREATER_OR_EQUAL,
-            vk::CompareOp::EQUAL => vk::CompareOp::LESS_OR_EQUAL,
-            op => op,
-        };
-        let depths: Vec<f32> =
-            self.positions.iter().map(|p| stored_depth(self.format, at(record, *p))).collect();
-        let [x, y] = [record.x(), record.y()].map(|v| v as u16);
-        let held = self.held.at(x, y);
         let mut passed = 0;
-        for (s, (held, depth)) in held.iter_mut().zip(depths).enumerate() {
-            let passes = match op {
+        self.each_sample(record, coverage, |s, held, depth| {
+            let passes = match vk::CompareOp::from_raw(state.depth_op) {
                 vk::CompareOp::NEVER => false,
                 vk::CompareOp::LESS => depth < *held,
                 vk::CompareOp::EQUAL => depth == *held,
@@ -98,19 +72,43 @@ impl DepthImage {
                 vk::CompareOp::GREATER_OR_EQUAL => depth >= *held,
                 _ => true,
             };
-            if coverage >> s & 1 == 1 && passes {
+            if passes {
                 passed |= 1 << s;
                 if state.depth_write {
                     *held = depth;
                 }
             }
-        }
+        });
         passed
     }
-}
 
-/// The depth images of a frame.
-pub(crate) type DepthImages = BTreeMap<Place, DepthImage>;
+    /// Brings samples nearer that a record covers, where it is nearer than what they hold.
+    pub(crate) fn bring_nearer(&mut self, record: &Record, coverage: u64, reversed: bool) {
+        self.each_sample(record, coverage, |_, held, depth| {
+            *held = if reversed { held.max(depth) } else { held.min(depth) };
+        });
+    }
+
+    /// Calls `each` with the samples of `coverage`: number, what it holds, the record's depth.
+    fn each_sample(
+        &mut self,
+        record: &Record,
+        coverage: u64,
+        mut each: impl FnMut(usize, &mut f32, f32),
+    ) {
+        let DepthImage { format, positions, held, .. } = self;
+        let [width, height] = held.size();
+        if record.x() >= width || record.y() >= height {
+            return;
+        }
+        let held = held.at(record.x() as u16, record.y() as u16);
+        for (s, (held, position)) in held.iter_mut().zip(positions).enumerate() {
+            if coverage >> s & 1 == 1 {
+                each(s, held, stored_depth(*format, at(record, *position)));
+            }
+        }
+    }
+}
 
 /// The depth plane of a record as a trace has it, and whether its slopes were too steep, or it
 /// leaves the range at the centre, so that it is flat.
@@ -159,26 +157,22 @@ mod tests {
         let positions = [[-4, -4], [4, 4]];
         let mut image = DepthImage::new([64, 64], vk::Format::D32_SFLOAT.as_raw(), &positions, 1.0);
         let less = test(vk::CompareOp::LESS, true);
-        assert_eq!(image.test(&record(0.5, [0.0; 2]), 3, &less, false), 3);
+        assert_eq!(image.test(&record(0.5, [0.0; 2]), 3, &less), 3);
         // 0.45 on the left, 0.55 on the right.
-        assert_eq!(image.test(&record(0.5, [0.2, 0.0]), 3, &less, false), 1);
-        assert_eq!(image.test(&record(0.47, [0.0; 2]), 3, &less, false), 2);
+        assert_eq!(image.test(&record(0.5, [0.2, 0.0]), 3, &less), 1);
+        assert_eq!(image.test(&record(0.47, [0.0; 2]), 3, &less), 2);
         let peek = test(vk::CompareOp::LESS, false);
-        assert_eq!(image.test(&record(0.46, [0.0; 2]), 3, &peek, false), 2);
-        assert_eq!(image.test(&record(0.46, [0.0; 2]), 3, &peek, false), 2, "nothing was written");
+        assert_eq!(image.test(&record(0.46, [0.0; 2]), 3, &peek), 2);
+        assert_eq!(image.test(&record(0.46, [0.0; 2]), 3, &peek), 2, "nothing was written");
         let greater = test(vk::CompareOp::GREATER, true);
-        assert_eq!(image.test(&record(0.9, [0.0; 2]), 1, &greater, true), 1);
-        assert_eq!(image.test(&record(0.9, [0.0; 2]), 1, &State::default(), true), 1);
-        assert_eq!(
-            image.test(&record(0.9, [0.0; 2]), 3, &test(vk::CompareOp::NEVER, true), true),
-            0
-        );
-        // Equal stands for what is nearest, until all is known.
+        assert_eq!(image.test(&record(0.9, [0.0; 2]), 1, &greater), 1);
+        assert_eq!(image.test(&record(0.9, [0.0; 2]), 1, &State::default()), 1);
+        assert_eq!(image.test(&record(0.9, [0.0; 2]), 3, &test(vk::CompareOp::NEVER, true)), 0);
         let equal = test(vk::CompareOp::EQUAL, false);
-        assert_eq!(image.test(&record(0.8, [0.0; 2]), 3, &equal, false), 1);
-        assert_eq!(image.test(&record(0.8, [0.0; 2]), 3, &equal, true), 2);
-        image.set_known(true);
-        assert_eq!(image.test(&record(0.8, [0.0; 2]), 3, &equal, false), 0);
-        assert_eq!(image.test(&record(0.9, [0.0; 2]), 3, &equal, false), 1);
+        assert_eq!(image.test(&record(0.9, [0.0; 2]), 3, &equal), 1);
+        image.bring_nearer(&record(0.8, [0.0; 2]), 3, false);
+        assert_eq!(image.test(&record(0.8, [0.0; 2]), 3, &equal), 1);
+        image.bring_nearer(&record(0.85, [0.0; 2]), 3, true);
+        assert_eq!(image.test(&record(0.85, [0.0; 2]), 3, &equal), 3);
     }
 }

@@ -4,12 +4,14 @@ use screendoor_trace::error::{Error, Result};
 use screendoor_trace::trace::{ColourFormat, DepthPlane, Fragment, SampleMask, Unorm32};
 use screendoor_vulkan_layer::log::Record;
 
+use crate::background::rgb;
 use crate::blend::Outcome;
 use crate::convert::{Conversion, Dropped, Object};
-use crate::depth::{DepthImage, DepthImages, DepthRule, plane};
+use crate::depth::{DepthRule, plane};
+use crate::depth_images::DepthImages;
 use crate::plan::{Act, Plan, Planned};
 use crate::records::FRONT;
-use crate::samples::covers;
+use crate::samples::Area;
 use crate::target::Place;
 
 type Push<'a> = &'a mut dyn FnMut(&Fragment) -> Result<()>;
@@ -26,7 +28,7 @@ pub(crate) struct Making<'a> {
     step: u64,
     /// The greatest number that a colour may be.
     most: f64,
-    images: DepthImages,
+    images: DepthImages<'a>,
     /// Acts that are done.
     done: usize,
     /// Records of one primitive in one pixel.
@@ -56,7 +58,7 @@ impl<'a> Making<'a> {
         depth: DepthRule,
         is_painted: bool,
     ) -> Self {
-        let records: u64 = plan.kept().map(|p| p.records).sum();
+        let records: u64 = plan.kept().map(|p| p.records).sum::<u64>() + plan.partial_clears;
         // A power of two, so that narrower depths tell as many apart as they can.
         let step = (u64::from(u32::MAX) - 1) / (records + 2);
         Making {
@@ -70,7 +72,7 @@ impl<'a> Making<'a> {
                 ColourFormat::F16 => 65504.0,
                 ColourFormat::F32 => f32::MAX.into(),
             },
-            images: DepthImages::new(),
+            images: DepthImages::new(&conversion.chosen, plan),
             done: 0,
             group: Vec::new(),
             primitive: is_painted.into(),
@@ -102,6 +104,8 @@ impl<'a> Making<'a> {
     /// Ends with the last record.
     pub(crate) fn finish(mut self, push: Push<'_>) -> Result<(Dropped, Vec<Object>)> {
         self.flush(push)?;
+        self.primitive += std::mem::take(&mut self.used);
+        self.catch_up(self.plan.acts.len(), push)?;
         Ok((self.dropped, self.objects))
     }
 
@@ -136,14 +140,14 @@ impl<'a> Making<'a> {
     fn flush(&mut self, push: Push<'_>) -> Result<()> {
         let group = std::mem::take(&mut self.group);
         let Some(act) = group.first().map(|r| r.slot) else { return Ok(()) };
-        self.catch_up(act as usize);
+        self.catch_up(act as usize, push)?;
         let Some(planned) = self.planned(act) else { return Ok(()) };
         let per_sample =
             self.conversion.chosen.capture.pipelines[&planned.draw.pipeline].per_sample;
         // Pieces that share a number cover none of each other's samples.
         let mut layers: Vec<(u64, Vec<Piece>)> = Vec::new();
         for record in &group {
-            let Some(coverage) = self.tested(planned, record) else { continue };
+            let Some(coverage) = self.tested(planned, record)? else { continue };
             let layer = layers.iter().position(|(covered, _)| covered & coverage == 0);
             let layer = layer.unwrap_or_else(|| {
                 layers.push((0, Vec::new()));
@@ -172,7 +176,7 @@ impl<'a> Making<'a> {
 
     /// The samples of a record that are drawn; `None` where there are none, or where the draw is
     /// looked at for its depths alone.
-    fn tested(&mut self, planned: &Planned<'_>, record: &Record) -> Option<u64> {
+    fn tested(&mut self, planned: &Planned<'_>, record: &Record) -> Result<Option<u64>> {
         let is_kept = planned.rule.is_some();
         let samples = match &planned.pass.colour {
             // Another target's samples may be more.
@@ -182,58 +186,88 @@ impl<'a> Making<'a> {
         let mut coverage = u64::from(record.coverage & !FRONT) & samples;
         if coverage == 0 {
             self.dropped.uncovered += u64::from(is_kept);
-            return None;
+            return Ok(None);
         }
         if self.depth == DepthRule::Order
             && let Some(depth) = planned.tested()
         {
-            let reversed = self.reversed;
-            let image = self.image(depth.into(), depth.format);
-            coverage = image.test(record, coverage, &planned.draw.state, reversed);
+            let draw = (planned.at, planned.draw);
+            coverage = self.images.test(draw, depth, record, coverage)?;
             if coverage == 0 {
                 self.dropped.hidden += u64::from(is_kept);
-                return None;
+                return Ok(None);
             }
         }
-        is_kept.then_some(coverage)
-    }
-
-    fn image(&mut self, place: Place, format: i32) -> &mut DepthImage {
-        let capture = self.conversion.chosen.capture;
-        let far = if self.reversed { 0.0 } else { 1.0 };
-        self.images.entry(place).or_insert_with(|| {
-            let samples = capture.images[&place.image].samples;
-            let pattern = screendoor_trace::trace::SamplePattern::standard(samples);
-            let positions = pattern.map_or_else(|| vec![[0, 0]], |p| p.positions);
-            DepthImage::new(capture.size(place), format, &positions, far)
-        })
+        Ok(is_kept.then_some(coverage))
     }
 
     /// Does what comes before an act.
-    fn catch_up(&mut self, act: usize) {
+    fn catch_up(&mut self, act: usize, push: Push<'_>) -> Result<()> {
         while self.done < act {
             match &self.plan.acts[self.done] {
                 Act::Draw(_) => {}
-                Act::Begin(pass, depth) => {
-                    let clears = depth.load == ash::vk::AttachmentLoadOp::CLEAR.as_raw();
-                    if clears && self.depth == DepthRule::Order {
-                        let place = Place::from(*depth);
-                        let capture = self.conversion.chosen.capture;
-                        let is_known = covers(pass.area, capture.size(place))
-                            && !self.plan.unrecorded.contains(&place);
-                        let image = self.image(place, depth.format);
-                        image.clear(pass.area, depth.clear[0]);
-                        image.set_known(is_known);
-                    }
-                }
-                Act::ClearDepth(place, area, value) => {
-                    if let Some(image) = self.images.get_mut(place) {
-                        image.clear(*area, *value);
-                    }
-                }
+                Act::Begin(pass, _) => self.images.begin(pass),
+                Act::ClearDepth(depth, area, value) => self.images.clear(depth, *area, *value),
+                Act::Paint(area, colour) => self.paint(*area, *colour, push)?,
             }
             self.done += 1;
         }
+        Ok(())
+    }
+
+    /// Covers a part of the frame with a colour, where the order of drawing decides.
+    fn paint(&mut self, area: Area, colour: [f32; 4], push: Push<'_>) -> Result<()> {
+        if self.depth != DepthRule::Order {
+            return Ok(());
+        }
+        let primitive = self.number(0)?;
+        let depth = self.ordered(0);
+        self.primitive += 1;
+        self.object = None;
+        let object = self
+            .new_object(Object { command: "a clear of a part".to_string(), ..Object::default() });
+        let header = self.conversion.header();
+        let colour = rgb(self.conversion.format.stored(colour));
+        let sides = |from: i32, length: i32, most: u32| {
+            let within = |at: i64| at.clamp(0, most.into()) as u32;
+            within(from.into())..within(i64::from(from) + i64::from(length))
+        };
+        let [left, upper, width, height] = area;
+        for y in sides(upper, height, header.height) {
+            for x in sides(left, width, header.width) {
+                self.count();
+                push(&Fragment {
+                    x: x as u16,
+                    y: y as u16,
+                    coverage: SampleMask(self.samples),
+                    depth,
+                    colour,
+                    alpha: 1.0,
+                    primitive,
+                    object,
+                    ..Fragment::default()
+                })?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The number in the trace of a layer of the primitive.
+    fn number(&self, layer: u64) -> Result<u32> {
+        u32::try_from(self.primitive + layer).map_err(|_| {
+            Error::unsupported(
+                &self.conversion.header().source,
+                "more than 2^32 primitives leave fragments",
+                "capture less at a time, with --submits",
+            )
+        })
+    }
+
+    /// The depth of a layer of the primitive by the order of drawing.
+    fn ordered(&self, layer: u64) -> DepthPlane {
+        let back = u64::from(u32::MAX) - 1;
+        let z = back.saturating_sub((self.primitive + layer) * self.step) as u32;
+        DepthPlane { z: Unorm32(z), dzdx: 0, dzdy: 0 }
     }
 
     fn emit(
@@ -262,21 +296,10 @@ impl<'a> Making<'a> {
             }
         };
         self.dropped.not_finite += u64::from(!is_finite);
-        let number = self.primitive + layer;
-        let Ok(primitive) = u32::try_from(number) else {
-            return Err(Error::unsupported(
-                &self.conversion.header().source,
-                "more than 2^32 primitives leave fragments",
-                "capture less at a time, with --submits",
-            ));
-        };
+        let primitive = self.number(layer)?;
         self.used = self.used.max(layer + 1);
         let depth = match self.depth {
-            DepthRule::Order => {
-                let back = u64::from(u32::MAX) - 1;
-                let z = back.saturating_sub(number * self.step) as u32;
-                DepthPlane { z: Unorm32(z), dzdx: 0, dzdy: 0 }
-            }
+            DepthRule::Order => self.ordered(layer),
             _ => {
                 let (plane, flat) = plane(&piece.record, self.reversed);
                 self.dropped.flattened += u64::from(flat);
@@ -298,26 +321,32 @@ impl<'a> Making<'a> {
         })
     }
 
-    /// The number of the draw's object.
+    /// The number of the draw's object, which has one fragment more.
     fn object(&mut self, planned: &Planned<'_>, act: u32) -> u32 {
         if self.object != Some(act) {
             self.object = Some(act);
             let pipelines = &self.conversion.chosen.capture.pipelines;
-            self.objects.push(Object {
-                object: self.first_object + self.objects.len() as u32,
+            self.new_object(Object {
                 label: planned.draw.label.clone(),
                 command: planned.draw.command.clone(),
                 pipeline: pipelines[&planned.draw.pipeline].name.clone(),
-                fragments: 0,
+                ..Object::default()
             });
         }
-        match self.objects.last_mut() {
-            Some(object) => {
-                object.fragments += 1;
-                object.object
-            }
-            None => 0,
-        }
+        self.count();
+        self.objects.last().map_or(0, |object| object.object)
+    }
+
+    /// Gives an object its number.
+    fn new_object(&mut self, object: Object) -> u32 {
+        let number = self.first_object + self.objects.len() as u32;
+        self.objects.push(Object { object: number, ..object });
+        number
+    }
+
+    /// The last object has one fragment more.
+    fn count(&mut self) {
+        self.objects.iter_mut().next_back().into_iter().for_each(|object| object.fragments += 1);
     }
 }
 

@@ -26,13 +26,19 @@ pub(crate) enum Flaw {
     Unended,
 }
 
-/// What a command buffer does, and within which pass.
-#[derive(Clone, Copy)]
-pub(crate) struct Step<'a> {
+/// Where something is done.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub(crate) struct At {
     /// Place in [`DeviceCapture::submissions`].
     pub submission: usize,
     /// Place in [`Submission::events`].
     pub event: usize,
+}
+
+/// What a command buffer does, and within which pass.
+#[derive(Clone, Copy)]
+pub(crate) struct Step<'a> {
+    pub at: At,
     pub pass: Option<&'a Pass>,
     pub what: &'a Event,
 }
@@ -61,7 +67,7 @@ impl Frame {
                 if let Event::Pass(begun) = what {
                     pass = Some(begun);
                 }
-                Step { submission, event, pass, what }
+                Step { at: At { submission, event }, pass, what }
             })
         })
     }

@@ -11,6 +11,7 @@ mod blend;
 mod check;
 mod convert;
 mod depth;
+mod depth_images;
 mod equation;
 mod folder;
 mod format;

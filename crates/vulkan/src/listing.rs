@@ -117,11 +117,11 @@ fn device(capture: &DeviceCapture, device: usize, numbers: &Numbers) -> Result<L
         let mut counts = Vec::new();
         let mut open: Option<Building> = None;
         for step in frame.steps(capture) {
-            let submission = &capture.submissions[step.submission];
-            if step.event == 0 {
+            let submission = &capture.submissions[step.at.submission];
+            if step.at.event == 0 {
                 counts = Records::of(capture, submission).counts()?;
             }
-            let begins = matches!(step.what, Event::Pass(_)) || step.event == 0;
+            let begins = matches!(step.what, Event::Pass(_)) || step.at.event == 0;
             if begins && let Some(pass) = open.take() {
                 passes.push(pass.finish());
             }
@@ -134,7 +134,7 @@ fn device(capture: &DeviceCapture, device: usize, numbers: &Numbers) -> Result<L
                 open = Some(Building::new(frame, submission, target, pass));
             }
             if let (Some(building), Event::Draw(draw)) = (&mut open, step.what) {
-                building.draw(capture, &step, draw, counts[step.event]);
+                building.draw(capture, &step, draw, counts[step.at.event]);
             }
         }
         passes.extend(open.map(Building::finish));

@@ -8,7 +8,7 @@ use screendoor_vulkan_layer::log::{Attachment, Clear, Draw, Event, Pass};
 
 use crate::blend::{self, Rule};
 use crate::depth::is_reversed;
-use crate::frame::Step;
+use crate::frame::{At, Step};
 use crate::samples::{Area, covers};
 use crate::target::{Chosen, Place};
 
@@ -28,14 +28,15 @@ pub(crate) enum Act<'a> {
     /// A pass with a depth image begins.
     Begin(&'a Pass, &'a Attachment),
     /// A part of a depth image is cleared.
-    ClearDepth(Place, Area, f32),
+    ClearDepth(&'a Attachment, Area, f32),
     Draw(Planned<'a>),
+    /// A part of the target is cleared to a colour.
+    Paint(Area, [f32; 4]),
 }
 
 /// A draw that is looked at.
 pub(crate) struct Planned<'a> {
-    /// Place in the capture's submissions.
-    pub submission: usize,
+    pub at: At,
     pub pass: &'a Pass,
     pub draw: &'a Draw,
     /// Records that it left.
@@ -151,19 +152,25 @@ impl<'a> Plan<'a> {
             Act::Draw(planned) => {
                 planned.records > 0 && (planned.rule.is_some() || planned.for_depth)
             }
-            Act::Begin(..) | Act::ClearDepth(..) => true,
+            Act::Begin(..) | Act::ClearDepth(..) | Act::Paint(..) => true,
         });
         plan
     }
 
     /// All that was drawn is gone.
     fn reset(&mut self, base: Base, since: &mut usize) {
-        for act in &mut self.acts[*since..] {
-            if let Act::Draw(planned) = act
-                && planned.rule.take().is_some()
-            {
-                self.painted_over.add(planned.records);
+        let gone = self.acts.split_off(*since);
+        for mut act in gone {
+            match &mut act {
+                Act::Paint(..) => continue,
+                Act::Draw(planned) => {
+                    if planned.rule.take().is_some() {
+                        self.painted_over.add(planned.records);
+                    }
+                }
+                Act::Begin(..) | Act::ClearDepth(..) => {}
             }
+            self.acts.push(act);
         }
         let refused = std::mem::take(&mut self.refused).into_values();
         for [draws, fragments] in refused {
@@ -195,12 +202,12 @@ impl<'a> Plan<'a> {
                 self.reset(Base::Cleared(colour.clear), since);
                 self.partial_clears += u64::from(!is_whole);
             }
-            vk::AttachmentLoadOp::CLEAR => self.partial_clears += 1,
+            vk::AttachmentLoadOp::CLEAR => self.paint(pass.area, colour.clear),
             vk::AttachmentLoadOp::DONT_CARE if is_whole || !begun => {
                 self.reset(Base::Undefined, since);
             }
             // What is loaded, and parts of which nobody cares what was there.
-            _ if !begun => self.base = Base::Loaded { submission: step.submission },
+            _ if !begun => self.base = Base::Loaded { submission: step.at.submission },
             _ => {}
         }
     }
@@ -217,20 +224,25 @@ impl<'a> Plan<'a> {
         if clear.depth {
             let depth = step.pass.and_then(|p| p.depth.as_ref());
             if let Some(depth) = depth.filter(|d| shared.contains(&Place::from(*d))) {
-                let act = Act::ClearDepth(depth.into(), clear.area, clear.value[0]);
+                let act = Act::ClearDepth(depth, clear.area, clear.value[0]);
                 self.acts.push(act);
             }
         } else if on && covers(clear.area, chosen.capture.size(chosen.place)) {
             self.reset(Base::Cleared(clear.value), since);
         } else if on {
-            self.partial_clears += 1;
+            self.paint(clear.area, clear.value);
         }
+    }
+
+    fn paint(&mut self, area: Area, colour: [f32; 4]) {
+        self.partial_clears += 1;
+        self.acts.push(Act::Paint(area, colour));
     }
 
     fn write(&mut self, step: &Step<'_>, command: String) {
         let drawn = self.has_fragments();
         if !drawn {
-            self.written = Some(step.submission);
+            self.written = Some(step.at.submission);
         }
         *self.writes.entry((drawn, command)).or_default() += 1;
     }
@@ -244,7 +256,7 @@ impl<'a> Plan<'a> {
         shared: &BTreeSet<Place>,
     ) {
         let Some(pass) = step.pass else { return };
-        let records = chosen.count(step.submission, step.event);
+        let records = chosen.count(step.at);
         let mut rule = None;
         if on {
             match blend::rule(chosen.capture, pass, draw) {
@@ -264,8 +276,8 @@ impl<'a> Plan<'a> {
         }
         let for_depth = is_depth && place.is_some_and(|p| shared.contains(&p));
         if rule.is_some() || for_depth {
-            let submission = step.submission;
-            self.acts.push(Act::Draw(Planned { submission, pass, draw, records, rule, for_depth }));
+            let at = step.at;
+            self.acts.push(Act::Draw(Planned { at, pass, draw, records, rule, for_depth }));
         }
     }
 

@@ -44,6 +44,12 @@ impl<T: Copy + 'static> Samples<T> {
         Samples { count, before, parts: Vec::new(), tiles }
     }
 
+    /// Width and height, in pixels.
+    pub(crate) fn size(&self) -> [u32; 2] {
+        let grid = self.tiles.grid();
+        [grid.width(), grid.height()]
+    }
+
     /// How many samples a pixel has.
     pub(crate) fn count(&self) -> usize {
         self.count

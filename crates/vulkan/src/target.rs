@@ -11,7 +11,7 @@ use screendoor_vulkan_layer::settings::Span;
 
 use crate::folder::{Captures, DeviceCapture};
 use crate::format::name;
-use crate::frame::{Frame, frames, last_whole};
+use crate::frame::{At, Frame, frames, last_whole};
 use crate::records::Records;
 
 /// What is drawn into: a layer and a mip level of an image.
@@ -119,8 +119,8 @@ pub(crate) struct Chosen<'a> {
 
 impl Chosen<'_> {
     /// How many records an event has.
-    pub(crate) fn count(&self, submission: usize, event: usize) -> u64 {
-        self.counts[submission - self.frame.submissions.start][event]
+    pub(crate) fn count(&self, at: At) -> u64 {
+        self.counts[at.submission - self.frame.submissions.start][at.event]
     }
 }
 
@@ -202,7 +202,7 @@ fn candidates(chosen: &Chosen<'_>, number: &dyn Fn(Place) -> usize) -> Vec<Candi
             is_presented: false,
         });
         candidate.is_presented |= shown(colour) || pass.resolve.as_ref().is_some_and(shown);
-        candidate.fragments += chosen.count(step.submission, step.event);
+        candidate.fragments += chosen.count(step.at);
     }
     let mut all: Vec<Candidate> = all.into_values().collect();
     all.sort_by_key(|c| c.number);

@@ -37,9 +37,10 @@ pub(crate) fn of(
     for (count, what) in counted.into_iter().filter(|(count, _)| *count > 0) {
         told.push(format!("{} {what}", plural(count, "fragment")));
     }
-    if plan.partial_clears > 0 {
+    if plan.partial_clears > 0 && converted.depth != DepthRule::Order {
         told.push(format!(
-            "a part of the target was cleared {}: the trace still has what was there",
+            "a part of the target was cleared {}: the trace still has what was there \
+             (--depth order draws over it)",
             times(plan.partial_clears)
         ));
     }
@@ -85,6 +86,7 @@ fn of_program_depth(plan: &Plan<'_>, told: &mut Vec<String>) {
     for act in &plan.acts {
         match act {
             Act::Draw(planned) => begun |= planned.tested().is_some(),
+            Act::Paint(..) => {}
             Act::ClearDepth(..) => again += u64::from(begun),
             Act::Begin(_, depth) => {
                 let clears = depth.load == vk::AttachmentLoadOp::CLEAR.as_raw();

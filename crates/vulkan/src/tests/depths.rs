@@ -166,3 +166,68 @@ fn ranges_of_both_kinds_are_warned_of() {
     let (_, converted) = made.converted(by(DepthRule::Program));
     assert!(converted.warnings[0].contains("1 fragment are tested for greater"));
 }
+
+/// A draw without a fragment shader, of which there are no records.
+fn prepass(made: &mut Made) -> Draw {
+    made.entries.push(Entry::Pipeline(Pipeline {
+        number: 5,
+        refused: "it has no fragment shader".into(),
+        samples: 1,
+        ..Pipeline::default()
+    }));
+    let mut draw = testing(opaque(u32::MAX), vk::CompareOp::LESS, true);
+    draw.state.mask = 0;
+    Draw { pipeline: 5, ..draw }
+}
+
+#[test]
+fn what_asks_for_the_same_depth_is_nearest_where_that_left_no_records() {
+    for (op, clear, near, far) in
+        [(vk::CompareOp::LESS, 1.0, 0.25, 0.75), (vk::CompareOp::GREATER, 0.0, 0.75, 0.25)]
+    {
+        let mut made = Made::new();
+        let first = testing(prepass(&mut made), op, true);
+        // Says which way depths go.
+        let other = testing(over(3), op, false);
+        let events = vec![
+            begin(with_depth(pass(CLEAR, BLACK), clear)),
+            draw(first),
+            draw(other),
+            draw(testing(over(0), vk::CompareOp::EQUAL, false)),
+            draw(testing(over(1), vk::CompareOp::EQUAL, false)),
+        ];
+        let records = vec![
+            at(grey(0, 0, 0.5), far),
+            at(grey(1, 0, 0.5), near),
+            at(grey(0, 1, 0.5), far),
+            at(grey(3, 3, 0.5), near),
+        ];
+        made.submit(events, records);
+        let (trace, converted) = made.converted(by(DepthRule::Order));
+        let found: Vec<_> = fragments(&trace).iter().map(|f| (f.object, f.x)).collect();
+        assert_eq!(found, [(0, 3), (1, 1), (2, 0)], "{op:?}");
+        assert_eq!(converted.dropped.hidden, 1);
+    }
+}
+
+#[test]
+fn what_asks_for_the_same_depth_gets_it_where_all_is_recorded() {
+    let mut made = Made::new();
+    let mut first = testing(opaque(5), vk::CompareOp::LESS, true);
+    first.state.mask = 0;
+    let events = vec![
+        begin(with_depth(pass(CLEAR, BLACK), 1.0)),
+        draw(first),
+        draw(testing(over(0), vk::CompareOp::EQUAL, false)),
+    ];
+    // Of pixel 1 the first draw has discarded what lies nearest.
+    let records = vec![
+        at(grey(5, 0, 1.0), 0.25),
+        at(grey(5, 1, 1.0), 0.75),
+        at(grey(0, 0, 0.5), 0.25),
+        at(grey(0, 1, 0.5), 0.25),
+    ];
+    made.submit(events, records);
+    let (trace, _) = made.converted(by(DepthRule::Order));
+    assert_eq!(fragments(&trace).iter().map(|f| f.x).collect::<Vec<_>>(), [0]);
+}

@@ -1,5 +1,6 @@
 //! Captures that no layer wrote: each rule in a case of few fragments.
 
+mod checks;
 mod damage;
 mod depths;
 mod frames;

@@ -37,16 +37,36 @@ fn a_clear_of_all_begins_anew() {
 }
 
 #[test]
-fn a_clear_of_a_part_is_warned_of() {
-    let part = Pass { area: [0, 0, 4, 3], ..pass(CLEAR, BLACK) };
-    for event in [begin(part), clear(BLACK, [1, 0, 3, 4])] {
+fn a_clear_of_a_part_is_drawn_in_order_and_warned_of_else() {
+    let part = Pass { area: [1, 0, 2, 3], ..pass(CLEAR, [1.0, 0.0, 0.0, 1.0]) };
+    for event in [begin(part), clear([1.0, 0.0, 0.0, 1.0], [1, 0, 2, 3])] {
         let mut made = Made::new();
-        let events = vec![begin(pass(CLEAR, BLACK)), draw(over(0)), event, draw(over(1))];
+        let events = vec![begin(pass(CLEAR, BLACK)), draw(over(0)), event.clone(), draw(over(1))];
         made.submit(events, vec![grey(0, 0, 0.25), grey(1, 0, 0.75)]);
-        let (trace, converted) = made.converted(options());
+        let program = ConvertOptions { depth: crate::DepthRule::Program, ..options() };
+        let (trace, converted) = made.converted(program);
         assert_eq!(alphas(&trace), [0.25, 0.75]);
         let said = &converted.warnings[0];
         assert!(said.contains("a part of the target was cleared once"), "{said}");
+        let (trace, converted) = made.converted(options());
+        assert_eq!(converted.warnings, Vec::<String>::new());
+        let found = fragments(&trace);
+        assert_eq!(found.len(), 8);
+        let painted: Vec<_> = found[1..7].iter().map(|f| (f.x, f.y)).collect();
+        assert_eq!(painted, [(1, 0), (2, 0), (1, 1), (2, 1), (1, 2), (2, 2)]);
+        let red = found[1..7].iter().all(|f| f.colour == [1.0, 0.0, 0.0] && f.alpha == 1.0);
+        assert!(red && found.iter().map(|f| f.primitive).is_sorted());
+        assert!(found[0].depth.z > found[1].depth.z && found[6].depth.z > found[7].depth.z);
+        let objects: Vec<_> = converted.objects.iter().map(|o| (o.object, o.fragments)).collect();
+        assert_eq!(objects, [(0, 1), (1, 6), (2, 1)]);
+        // After the last draw, and beyond the frame.
+        let mut made = Made::new();
+        let late = clear(BLACK, [3, -5, 100, 6]);
+        let events = vec![begin(pass(CLEAR, BLACK)), draw(over(0)), event, late];
+        made.submit(events, vec![grey(0, 0, 0.25)]);
+        let (trace, _) = made.converted(options());
+        let last = fragments(&trace)[7];
+        assert_eq!((trace.rows(), last.x, last.y), (8, 3, 0));
     }
 }
 
