@@ -11,10 +11,12 @@ use crate::cli::arguments::{MemoryArgument, option, range};
 use crate::cli::capture::CommonArguments;
 use crate::cli::console::{Console, grouped, shown, table};
 use crate::cli::files::{Json, check, keep_trace, print_trace, report};
+use crate::cli::kind::{Kind, check_output};
 use crate::cli::signals::runs_under_us;
 use crate::error::{Error, Result};
 use crate::output::{OutputFile, TemporaryFolder};
-use crate::trace::{MAX_SAMPLES, TraceWriter, WriteOptions};
+use crate::param::Options;
+use crate::trace::{Header, MAX_SAMPLES, TraceWriter, WriteOptions, Written};
 use crate::vulkan::{
     Captures, Check, Conversion, ConvertOptions, Converted, DepthRule, Ended, ListedDevice,
     ListedPass, Listing, Run, Settings, Span, TargetChoice, layer_library, why_nothing,
@@ -73,7 +75,7 @@ pub(super) struct VulkanArguments {
 
 #[derive(Serialize)]
 struct Document<'a> {
-    trace: String,
+    trace: &'a str,
     width: u32,
     height: u32,
     samples: u32,
@@ -102,49 +104,87 @@ pub(super) fn run(
             listing.devices.iter().try_for_each(|device| print(device, console))
         });
     }
+    if arguments.from.is_some() {
+        captures.notes().for_each(|note| console.note(format_args!("note: {note}")));
+    }
     let file = begun.file.take();
-    let Some(file) = file else {
-        return Err(Error::config("it is not said where the trace goes", "name it with -o"));
-    };
-    let options = ConvertOptions {
-        span: arguments.span(),
-        target: arguments.target,
-        depth: arguments.depth,
-        background: common.background.map(|b| b.map(|c| c as f32)),
-        space: common.space,
-        colour: common.colour(),
-        samples: Some(common.samples.unwrap_or(MAX_SAMPLES)),
-        memory: arguments.memory.bytes(),
-    };
-    let progress = console.progress("counting", "fragments");
-    let conversion = Conversion::new(&captures, options)?;
-    progress.name("converting");
-    let place = file.path().display().to_string();
-    let write = WriteOptions { compression: common.compress, ..WriteOptions::default() };
-    let header = conversion.header();
-    let mut writer = TraceWriter::new(file, &place, header.clone(), write)?;
-    let converted = conversion.write(&mut writer, &mut |done, of| progress.set(done, of))?;
-    progress.name("blending as the program does");
-    let told = &mut |done, of| progress.set(done, of);
-    let checked = common.check.then(|| conversion.check(told)).transpose()?;
-    drop(progress);
-    let (file, written) = writer.finish()?;
-    console.warn_all(&converted.warnings, common.strict, &header.source)?;
-    keep_trace(file)?;
-    let document = Document {
-        trace: place,
-        width: header.width,
-        height: header.height,
-        samples: header.pattern.samples(),
-        fragments: written.rows,
-        bytes: written.bytes,
-        content: &written.content,
-        converted: &converted,
-        check: checked.as_ref(),
-    };
-    report(json, "screendoor.vulkan", &document, console, || {
+    let written = arguments.convert(common, &captures, file, console);
+    if written.is_err() && matches!(begun.folder, Folder::Temporary(_)) {
+        console.note(format_args!("what was recorded is gone: --keep FOLDER keeps it for --from"));
+    }
+    let done = written?;
+    report(json, "screendoor.vulkan", &done.document(), console, || done.print(console))
+}
+
+/// A trace that is made and kept.
+struct Done {
+    place: String,
+    header: Header,
+    written: Written,
+    converted: Converted,
+    check: Option<Check>,
+}
+
+impl VulkanArguments {
+    /// Makes the trace.
+    fn convert(
+        &self,
+        common: &CommonArguments,
+        captures: &Captures,
+        file: Option<OutputFile>,
+        console: &Console,
+    ) -> Result<Done> {
+        let Some(file) = file else {
+            return Err(Error::config("it is not said where the trace goes", "name it with -o"));
+        };
+        let options = ConvertOptions {
+            span: self.span(),
+            target: self.target,
+            depth: self.depth,
+            background: common.background.map(|b| b.map(|c| c as f32)),
+            space: common.space,
+            colour: common.colour(),
+            samples: Some(common.samples.unwrap_or(MAX_SAMPLES)),
+            memory: self.memory.bytes(),
+        };
+        let progress = console.progress("counting", "fragments");
+        let conversion = Conversion::new(captures, options)?;
+        progress.name("converting");
+        let place = file.path().display().to_string();
+        let write = WriteOptions { compression: common.compress, ..WriteOptions::default() };
+        let header = conversion.header().clone();
+        let mut writer = TraceWriter::new(file, &place, header.clone(), write)?;
+        let told = &mut |done, of| progress.set(done, of);
+        let converted = conversion.write(&mut writer, told)?;
+        progress.name("blending as the program does");
+        let check = common.check.then(|| conversion.check(told)).transpose()?;
+        drop(progress);
+        let (file, written) = writer.finish()?;
+        console.warn_all(&converted.warnings, common.strict, &header.source)?;
+        keep_trace(file)?;
+        Ok(Done { place, header, written, converted, check })
+    }
+}
+
+impl Done {
+    fn document(&self) -> Document<'_> {
+        Document {
+            trace: &self.place,
+            width: self.header.width,
+            height: self.header.height,
+            samples: self.header.pattern.samples(),
+            fragments: self.written.rows,
+            bytes: self.written.bytes,
+            content: &self.written.content,
+            converted: &self.converted,
+            check: self.check.as_ref(),
+        }
+    }
+
+    fn print(&self, console: &Console) -> Result<()> {
+        let Done { header, converted, written, .. } = self;
         console.print(format_args!(
-            "{}, target #{}: {} draws into {} x {} pixels, {}, samples: {}",
+            "{}, target #{}: {} draws into {} x {} pixels, {}, samples: {}, depth: {}",
             converted.frame,
             converted.target,
             grouped(converted.objects.len() as u64),
@@ -152,10 +192,11 @@ pub(super) fn run(
             header.height,
             converted.format,
             header.pattern.samples(),
+            converted.depth.name(),
         ))?;
-        print_trace(&document.trace, &written, written.rows, console)?;
-        checked.iter().try_for_each(|check| print_check(check, console))
-    })
+        print_trace(&self.place, written, written.rows, console)?;
+        self.check.iter().try_for_each(|check| print_check(check, console))
+    }
 }
 
 /// Prints how far what was recorded is from the program's own picture.
@@ -266,7 +307,7 @@ impl Begun {
         }
         let captures = Captures::read(folder)?;
         if captures.is_empty() {
-            let (what, hint) = why_nothing(program);
+            let (what, hint) = why_nothing(program, ended);
             return Err(Error::unsupported(name, what, hint));
         }
         Ok(match ended {
@@ -278,6 +319,12 @@ impl Begun {
 
 /// What was kept in a folder.
 fn given(folder: &Path) -> Result<Captures> {
+    if folder.is_file() {
+        return Err(Error::config(
+            format_args!("{} is no folder", folder.display()),
+            "name a folder that --keep has filled",
+        ));
+    }
     let captures = Captures::read(folder)?;
     if captures.is_empty() {
         return Err(Error::config(
@@ -290,6 +337,7 @@ fn given(folder: &Path) -> Result<Captures> {
 
 /// A folder that is new, or has nothing in it, from the root on.
 fn new_folder(path: &Path) -> Result<PathBuf> {
+    check_output(path, Kind::Folder)?;
     let fail = |e| Error::io("make the folder", path, e);
     match std::fs::read_dir(path).map(|mut entries| entries.next().is_some()) {
         Ok(true) => {

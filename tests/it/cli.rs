@@ -7,6 +7,7 @@ mod outputs;
 mod study;
 mod told;
 mod traps;
+mod vulkan;
 mod words;
 
 use std::fs;

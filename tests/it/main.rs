@@ -21,6 +21,7 @@ mod inputs;
 mod large;
 mod layering;
 mod layers;
+mod left;
 mod limits;
 mod loaders;
 mod measured;

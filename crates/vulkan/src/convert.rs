@@ -191,6 +191,8 @@ pub struct Converted {
     pub dropped: Dropped,
     /// Draws that are not in the trace.
     pub refused: Vec<Refusal>,
+    /// What the layer has to say of the device.
+    pub notes: Vec<String>,
     /// What a user has to know.
     pub warnings: Vec<String>,
 }
@@ -328,6 +330,7 @@ impl<'a> Conversion<'a> {
             objects,
             dropped,
             refused: Refusal::list(plan.refused.clone()),
+            notes: chosen.capture.notes.clone(),
             warnings: Vec::new(),
         };
         converted.warnings = warnings::of(self, &plan, &converted);

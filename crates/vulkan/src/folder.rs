@@ -77,6 +77,11 @@ impl Captures {
         self.devices.is_empty()
     }
 
+    /// What the layer has to say of its devices.
+    pub fn notes(&self) -> impl Iterator<Item = &str> {
+        self.devices.iter().flat_map(|d| &d.notes).map(String::as_str)
+    }
+
     /// As it is where the program was ended early: what it never presents is not whole.
     pub fn broken_off(mut self) -> Self {
         self.devices.iter_mut().for_each(|device| device.is_torn = true);

@@ -3,6 +3,7 @@
 //! Formats are read by their names, which follow one grammar (`B8G8R8A8_UNORM`,
 //! `A2B10G10R10_UNORM_PACK32`), so that no table has to know each of them.
 
+use arrayvec::ArrayVec;
 use ash::vk;
 use half::f16;
 use screendoor_trace::picture::{Space, srgb};
@@ -31,7 +32,7 @@ struct Channel {
 pub(crate) struct PixelFormat {
     pub kind: Kind,
     /// From the lowest bit of a little-endian number up.
-    channels: Vec<Channel>,
+    channels: ArrayVec<Channel, 4>,
 }
 
 /// The name of a `VkFormat`, without what all have in common.
@@ -172,13 +173,13 @@ impl PixelFormat {
 }
 
 /// `R8G8B8A8` as channels.
-fn channels(text: &str) -> Option<Vec<Channel>> {
-    let mut channels: Vec<Channel> = Vec::new();
+fn channels(text: &str) -> Option<ArrayVec<Channel, 4>> {
+    let mut channels = ArrayVec::<Channel, 4>::new();
     for (at, letter) in text.char_indices().filter(|(_, c)| c.is_ascii_alphabetic()) {
         let of = "RGBA".find(letter)?;
         let digits = &text[at + 1..];
         let end = digits.find(|c: char| !c.is_ascii_digit()).unwrap_or(digits.len());
-        channels.push(Channel { of, bits: digits[..end].parse().ok()? });
+        channels.try_push(Channel { of, bits: digits[..end].parse().ok()? }).ok()?;
     }
     let twice = (1..channels.len()).any(|i| channels[..i].iter().any(|c| c.of == channels[i].of));
     (!channels.is_empty() && !twice && text.starts_with(char::is_alphabetic)).then_some(channels)

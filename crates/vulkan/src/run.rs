@@ -195,28 +195,29 @@ fn ended(status: ExitStatus) -> Ended {
     Ended::Code(status.code().unwrap_or(1))
 }
 
-/// Why a program may have left nothing, not even that it has a device.
-pub fn why_nothing(program: &OsStr) -> (String, String) {
-    let file = on_path(program);
+/// Why a program that ended so may have left nothing, not even that it has a device: what is to be
+/// said, and what to do.
+pub fn why_nothing(program: &OsStr, ended: Ended) -> (String, String) {
     let what = "it has opened no Vulkan device under the layer".to_string();
-    if let Some(file) = &file
-        && is_set_id(file)
-    {
-        let hint = format!(
-            "{} is set-uid or set-gid, and the loader then takes no layers: copy it",
+    let file = on_path(program);
+    let file = file.as_deref();
+    let hint = match (file, ended) {
+        (Some(file), _) if is_set_id(file) => format!(
+            "{} is set-uid or set-gid, and Vulkan's loader then takes no layers: run a copy",
             file.display()
-        );
-        return (what, hint);
-    }
-    if let Some(file) = &file
-        && is_static(file)
-    {
-        let hint = format!("{} is linked statically, without Vulkan's loader", file.display());
-        return (what, hint);
-    }
-    let hint = "it may use OpenGL (give --opengl), or not have drawn anything, or bring a loader \
-                of Vulkan from before 1.3.234 (set VK_LAYER_PATH to an empty folder)";
-    (what, hint.to_string())
+        ),
+        (Some(file), _) if is_static(file) => {
+            format!("{} is linked statically, without Vulkan's loader", file.display())
+        }
+        (_, Ended::Code(code)) if code != 0 => {
+            format!("it ended with exit code {code}: see what it says above")
+        }
+        (_, Ended::Signal(signal)) => format!("it was ended by signal {signal}"),
+        _ => "it may use OpenGL (give --opengl), or not have drawn anything, or bring a loader of \
+              Vulkan from before 1.3.234 (set VK_LAYER_PATH to an empty folder)"
+            .to_string(),
+    };
+    (what, hint)
 }
 
 /// The file that a program's name leads to.
@@ -306,6 +307,21 @@ mod tests {
         assert_eq!(value(&run, "GALLIUM_DRIVER", &[]), None);
         let opengl = Run { opengl: true, ..run };
         assert_eq!(value(&opengl, "GALLIUM_DRIVER", &[]).unwrap(), "zink");
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn why_there_is_nothing_is_told() {
+        use std::os::unix::fs::PermissionsExt;
+        let why = |program: &OsStr, ended| why_nothing(program, ended).1;
+        assert!(why(OsStr::new("sh"), Ended::Code(0)).contains("--opengl"));
+        assert!(why(OsStr::new("sh"), Ended::Code(3)).contains("exit code 3"));
+        assert!(why(OsStr::new("sh"), Ended::Signal(11)).contains("signal 11"));
+        let place = tempfile::tempdir().unwrap();
+        let file = place.path().join("p");
+        fs::write(&file, "#!/bin/sh").unwrap();
+        fs::set_permissions(&file, fs::Permissions::from_mode(0o4755)).unwrap();
+        assert!(why(file.as_os_str(), Ended::Code(3)).contains("set-uid"));
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Peak memory and time of every command on hostile sizes: within `--memory` and a constant,
 //! or refused at once.
 
+mod captures;
 mod scenes;
 mod studies;
 mod traces;
@@ -33,6 +34,7 @@ const HELD: &[Held] = &[
             scenes::a_texture_costs_its_texels_and_a_claim_nothing,
             scenes::triangles_cost_little_and_too_many_are_refused,
             scenes::a_vast_frame_costs_what_is_drawn_in_it,
+            captures::records_take_what_memory_says,
         ],
     ),
     ("info", &[traces::memory_is_what_was_allowed_and_a_constant]),
