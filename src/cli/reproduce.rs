@@ -17,6 +17,7 @@ use crate::report::document::Against;
 use crate::report::{Chapter, FIGURES_FOLDER, PARTS, chapter, check_marks, in_short, results};
 use crate::study::file::Publication;
 use crate::study::publications::experiment::Lab;
+use crate::study::publications::programs::recorded_programs;
 use crate::study::publications::{Effort, measure_publication};
 
 /// Rerun the publications' experiments and write RESULTS.md with its figures: three quarters of an
@@ -77,14 +78,14 @@ struct Part<'a> {
 
 /// Minutes on two processors that the parts take with the default effort, roughly: the tables
 /// (their share grows with the pixels and the seeds), the expectations (with theirs), the
-/// comparison of all designs, this project's own over many seeds, and splats.
-const MINUTES: [f64; 5] = [15.0, 7.0, 25.0, 12.0, 3.0];
+/// comparison of all designs, this project's own over many seeds, splats, and what programs drew.
+const MINUTES: [f64; 6] = [15.0, 7.0, 25.0, 12.0, 3.0, 2.0];
 
 /// How long it takes on so many threads, roughly, in minutes.
 fn minutes(effort: Effort, part: Option<Publication>, threads: usize) -> f64 {
     let square = |side: u32, usual: f64| (f64::from(side) / usual).powi(2);
     let seeds = f64::from(effort.seeds) / 4.0;
-    let [tables, means, comparison, beyond, splats] = MINUTES;
+    let [tables, means, comparison, beyond, splats, programs] = MINUTES;
     let of = |own: Publication| part.is_none_or(|only| only == own);
     let mut minutes = 0.0;
     if of(Publication::LaineKarras) {
@@ -103,6 +104,9 @@ fn minutes(effort: Effort, part: Option<Publication>, threads: usize) -> f64 {
     if of(Publication::Splats) {
         let seeds = f64::from(effort.seeds_of_means) / 128.0;
         minutes += splats * square(effort.comparison_side, 96.0) * seeds;
+    }
+    if of(Publication::Programs) {
+        minutes += programs;
     }
     minutes * 2.0 / threads as f64
 }
@@ -146,6 +150,16 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         let why = "there is no such folder; name the one that holds the models";
         return Err(Error::io("read", models, io::Error::new(io::ErrorKind::NotFound, why)));
     }
+    let mut parts = PARTS.to_vec();
+    parts.retain(|part| arguments.part.is_none_or(|only| only == *part));
+    // Of all parts, this one alone needs a checkout.
+    if let (true, Err(error)) = (parts.contains(&Publication::Programs), recorded_programs()) {
+        if arguments.part.is_some() {
+            return Err(error);
+        }
+        console.warn(&format!("{error}; the part 'programs' is left out"));
+        parts.retain(|part| *part != Publication::Programs);
+    }
     check_output(&arguments.output, Kind::Folder)?;
     let folder = arguments.output.join(FIGURES_FOLDER);
     std::fs::create_dir_all(&folder).map_err(|e| Error::io("create", &folder, e))?;
@@ -187,7 +201,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let lab = Lab { folder: runs, models: arguments.models.as_deref(), watch: &watch };
     let mut chapters: Vec<(Publication, Chapter)> = Vec::new();
     let mut missing = Vec::new();
-    for part in PARTS.into_iter().filter(|p| arguments.part.is_none_or(|only| only == *p)) {
+    for part in parts {
         let measured = measure_publication(part, &lab, effort)?;
         missing.extend_from_slice(measured.missing());
         chapters.push((part, chapter(&measured)));

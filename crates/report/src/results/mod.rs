@@ -13,6 +13,7 @@ mod front;
 mod methods;
 mod noise;
 mod pixel_orders;
+mod programs;
 mod ratios;
 mod slab;
 mod splats;
@@ -121,6 +122,10 @@ pub fn chapter(measured: &Reproduced) -> Chapter {
             in_short = splats::in_short(b);
             vec![splats::section(b)]
         }
+        Reproduced::Programs(results) => {
+            in_short = programs::in_short(results);
+            vec![programs::section(results)]
+        }
         Reproduced::Stability(s) => stability::sections(s),
     };
     Chapter { sections, in_short, figures }
@@ -153,12 +158,13 @@ const METHODS: [Of<Methods>; 8] = [
 ];
 
 /// The parts of RESULTS.md, each of which can be measured on its own.
-pub const PARTS: [Publication; 5] = [
+pub const PARTS: [Publication; 6] = [
     Publication::LaineKarras,
     Publication::Methods,
     Publication::Comparison,
     Publication::Beyond,
     Publication::Splats,
+    Publication::Programs,
 ];
 
 /// Where its figures lie, as seen from RESULTS.md.

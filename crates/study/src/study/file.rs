@@ -38,6 +38,7 @@ screendoor_trace::options! {
         Comparison = "comparison": "all designs at equal state, and Wyman's claim",
         Beyond = "beyond": "no publication's: residual and merging beside LK, error and bias over many seeds",
         Splats = "splats": "no publication's: samplers and layers on files of Gaussian splats",
+        Programs = "programs": "no publication's: fragments that four programs drew, under each design",
         Stability = "stability": "no publication's: hard cases with known truth, and correlations",
     }
 }

@@ -59,6 +59,7 @@ pub(in crate::study) mod studies {
     pub(crate) const EXPECTATIONS_CLOSELY: &str = study!("expectations-closely");
     pub(crate) const FIGURE_8: &str = study!("figure-8", "figure-8");
     pub(crate) const SPLATS: &str = study!("splats", "splats");
+    pub(crate) const PROGRAMS: &str = study!("programs", "programs");
 }
 
 /// Reads an embedded study.
@@ -118,9 +119,9 @@ impl Study {
 }
 
 impl SceneEntry {
-    /// What is drawn.
+    /// What is drawn, or the trace of what was.
     pub(in crate::study) fn drawn(&self) -> &str {
-        self.source.as_deref().unwrap_or("")
+        self.source.as_deref().or(self.trace.as_deref()).unwrap_or("")
     }
 
     /// Whether it needs no file.
@@ -329,6 +330,8 @@ mod tests {
             EXPECTATIONS,
             EXPECTATIONS_CLOSELY,
             FIGURE_8,
+            SPLATS,
+            PROGRAMS,
         ];
         let mut names: Vec<String> = all.map(|text| parse(text).unwrap().name).to_vec();
         names.sort();

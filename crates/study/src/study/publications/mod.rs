@@ -8,6 +8,7 @@ mod figures;
 pub mod hashes;
 pub mod methods;
 mod noise;
+pub mod programs;
 mod reproduced;
 mod sampling;
 pub mod splats;

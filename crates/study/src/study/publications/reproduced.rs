@@ -5,8 +5,10 @@ use crate::study::file::Publication;
 use crate::study::publications::beyond::{Beyond, beyond};
 use crate::study::publications::experiment::Lab;
 use crate::study::publications::methods::{Methods, methods};
+use crate::study::publications::programs::programs;
 use crate::study::publications::splats::splats;
 use crate::study::publications::{Effort, Publications, reproduce};
+use crate::study::results::Results;
 use crate::study::stress::{Stability, stress_designs};
 use screendoor_trace::error::Result;
 
@@ -25,6 +27,8 @@ pub enum Reproduced {
     Beyond(Box<Beyond>),
     /// [`Publication::Splats`].
     Splats(Box<Beyond>),
+    /// [`Publication::Programs`].
+    Programs(Box<Results>),
     /// [`Publication::Stability`].
     Stability(Box<Stability>),
 }
@@ -39,6 +43,7 @@ impl Reproduced {
             Reproduced::Comparison(_) => Publication::Comparison,
             Reproduced::Beyond(_) => Publication::Beyond,
             Reproduced::Splats(_) => Publication::Splats,
+            Reproduced::Programs(_) => Publication::Programs,
             Reproduced::Stability(_) => Publication::Stability,
         }
     }
@@ -47,7 +52,7 @@ impl Reproduced {
     pub fn missing(&self) -> &[String] {
         match self {
             Reproduced::LaineKarras(p) => &p.missing,
-            Reproduced::Methods(_) | Reproduced::Stability(_) => &[],
+            Reproduced::Methods(_) | Reproduced::Programs(_) | Reproduced::Stability(_) => &[],
             Reproduced::Slab(c) | Reproduced::Comparison(c) => &c.missing,
             Reproduced::Beyond(b) | Reproduced::Splats(b) => &b.missing,
         }
@@ -57,7 +62,7 @@ impl Reproduced {
 /// Measures a publication in a lab.
 ///
 /// # Errors
-/// As [`reproduce`], [`methods`], [`compare`] and [`beyond`], and where a hard case cannot be made.
+/// As [`reproduce`], [`methods`], [`compare`], [`beyond`] and [`programs`], and where a hard case cannot be made.
 pub fn measure_publication(
     publication: Publication,
     lab: &Lab<'_>,
@@ -70,6 +75,7 @@ pub fn measure_publication(
         Publication::Comparison => Reproduced::Comparison(Box::new(compare(lab, effort)?)),
         Publication::Beyond => Reproduced::Beyond(Box::new(beyond(lab, effort)?)),
         Publication::Splats => Reproduced::Splats(Box::new(splats(lab, effort)?)),
+        Publication::Programs => Reproduced::Programs(Box::new(programs(lab)?)),
         Publication::Stability => {
             Reproduced::Stability(Box::new(stress_designs(16, |what, done, total| {
                 (lab.watch)(what, done, total);
