@@ -52,6 +52,9 @@ pub(crate) struct Device {
     pub set_index: u32,
     /// Descriptors that a pipeline layout can hold.
     pub most: Counts,
+    /// Pipeline layouts can have sets of no layout. Mesa's lavapipe (its vendor's number is Mesa's
+    /// own) does not stand it that one is bound behind such (22.3), and is content with empty ones.
+    pub null_sets: bool,
     /// Locations between vertex and fragment shaders.
     pub locations: u32,
     /// Whether fragment shaders can ask for the primitive.
@@ -276,6 +279,7 @@ impl Device {
             set_loader_data,
             set_index: limits.max_bound_descriptor_sets - 1,
             most: most(limits),
+            null_sets: facts.properties.vendor_id != vk::VendorId::MESA.as_raw() as u32,
             locations: limits
                 .max_vertex_output_components
                 .min(limits.max_fragment_input_components)

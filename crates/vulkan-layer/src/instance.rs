@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeSet, HashMap};
 use std::ffi::{CStr, CString, c_char};
+use std::hash::{BuildHasherDefault, Hasher};
 use std::sync::{Arc, LazyLock, PoisonError, RwLock};
 
 use ash::vk::{self, Handle};
@@ -18,9 +19,35 @@ pub(crate) struct Instance {
     pub version: u32,
 }
 
+/// Pointers are spread well enough as they are.
+#[derive(Default)]
+pub(crate) struct Keys(u64);
+
+impl Hasher for Keys {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|byte| self.write_u64(u64::from(*byte)));
+    }
+
+    fn write_u64(&mut self, n: u64) {
+        // The map looks at the upper bits, too.
+        self.0 = (self.0 ^ n).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(32);
+    }
+
+    fn write_usize(&mut self, n: usize) {
+        self.write_u64(n as u64);
+    }
+}
+
+/// By handles and pointers.
+pub(crate) type Map<K, T> = HashMap<K, T, BuildHasherDefault<Keys>>;
+
 /// By what a dispatchable handle points at: the loader's table, which is one for an instance and its
 /// physical devices, and one for a device, its queues and command buffers.
-pub(crate) type Registry<T> = LazyLock<RwLock<HashMap<usize, Arc<T>>>>;
+pub(crate) type Registry<T> = LazyLock<RwLock<Map<usize, Arc<T>>>>;
 
 static INSTANCES: Registry<Instance> = LazyLock::new(Default::default);
 
@@ -290,9 +317,14 @@ mod tests {
             withhold(&mut left, 1, 4);
             assert_eq!(left, shown);
         }
-        let mut properties = vk::PhysicalDeviceProperties::default();
-        properties.api_version = vk::make_api_version(0, 1, 4, 7);
-        properties.limits.max_per_stage_resources = 1000;
+        let mut properties = vk::PhysicalDeviceProperties {
+            api_version: vk::make_api_version(0, 1, 4, 7),
+            limits: vk::PhysicalDeviceLimits {
+                max_per_stage_resources: 1000,
+                ..Default::default()
+            },
+            ..Default::default()
+        };
         withhold_all(&mut properties);
         assert!(properties.api_version < NEWEST);
         assert_eq!(properties.limits.max_per_stage_resources, 998);

@@ -1,6 +1,5 @@
 //! Layouts of descriptor sets and of pipelines. Pipeline layouts get our set at their end.
 
-use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use ash::vk::{self, Handle};
@@ -8,6 +7,7 @@ use ash::vk::{self, Handle};
 use crate::abi::{find, slice};
 use crate::device::{Device, device};
 use crate::guard;
+use crate::instance::Map;
 use crate::resources::KINDS;
 use crate::table::next;
 
@@ -117,8 +117,8 @@ impl PipelineLayout {
 
 #[derive(Default)]
 pub(crate) struct Layouts {
-    sets: HashMap<u64, SetLayout>,
-    pipelines: HashMap<u64, PipelineLayout>,
+    sets: Map<u64, SetLayout>,
+    pipelines: Map<u64, PipelineLayout>,
 }
 
 impl Layouts {
@@ -297,8 +297,8 @@ fn extended(
         Some([layout, empty]) => {
             // Sets of parts that do not know each other may only be padded with none at all.
             let apart = vk::PipelineLayoutCreateFlags::INDEPENDENT_SETS_EXT;
-            let none = vk::DescriptorSetLayout::null();
-            sets.resize(at, if info.flags.contains(apart) { none } else { empty });
+            let none = info.flags.contains(apart) && d.null_sets;
+            sets.resize(at, if none { vk::DescriptorSetLayout::null() } else { empty });
             sets.push(layout);
         }
     }

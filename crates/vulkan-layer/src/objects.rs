@@ -1,13 +1,14 @@
 //! What there is of the program's objects: images and views, passes and framebuffers, layouts,
 //! shaders, pipelines and command buffers, each by its handle.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 use std::sync::Arc;
 
 use ash::vk::{self, Handle};
 
 use crate::commands::Commands;
 use crate::device::Device;
+use crate::instance::Map;
 use crate::layouts::Layouts;
 use crate::log;
 use crate::pipelines::Pipeline;
@@ -111,20 +112,20 @@ pub(crate) struct Semaphore {
 #[derive(Default)]
 pub(crate) struct Objects {
     numbers: u64,
-    pub images: HashMap<u64, Image>,
+    pub images: Map<u64, Image>,
     /// Numbers of images by handle: a handle may be used again.
-    pub image_numbers: HashMap<u64, u64>,
-    pub views: HashMap<u64, View>,
-    pub swapchains: HashMap<u64, Swapchain>,
-    pub passes: HashMap<u64, Arc<RenderPass>>,
-    pub framebuffers: HashMap<u64, Arc<Framebuffer>>,
-    pub shaders: HashMap<u64, Arc<[u32]>>,
+    pub image_numbers: Map<u64, u64>,
+    pub views: Map<u64, View>,
+    pub swapchains: Map<u64, Swapchain>,
+    pub passes: Map<u64, Arc<RenderPass>>,
+    pub framebuffers: Map<u64, Arc<Framebuffer>>,
+    pub shaders: Map<u64, Arc<[u32]>>,
     pub layouts: Layouts,
-    pub pipelines: HashMap<u64, Arc<Pipeline>>,
-    pub commands: HashMap<u64, Commands>,
+    pub pipelines: Map<u64, Arc<Pipeline>>,
+    pub commands: Map<u64, Commands>,
     /// Command buffers of each pool.
-    pub pools: HashMap<u64, Vec<u64>>,
-    pub semaphores: HashMap<u64, Semaphore>,
+    pub pools: Map<u64, Vec<u64>>,
+    pub semaphores: Map<u64, Semaphore>,
     /// Of update templates that push descriptors for drawing: by which.
     pub templates: HashSet<u64>,
     pub slots: Slots,

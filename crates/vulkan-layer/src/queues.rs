@@ -287,7 +287,8 @@ pub(crate) fn run(
 
 /// Waits for all queues; says whether all are done.
 pub(crate) fn drain_all(d: &Device) -> bool {
-    d.all_queues().iter().fold(true, |done, queue| queue.drain(d) && done)
+    let open = d.all_queues().iter().filter(|queue| !queue.drain(d)).count();
+    open == 0
 }
 
 fn enter(d: &Device, handle: vk::Queue, family: u32) {

@@ -1,11 +1,12 @@
 //! What a command buffer does, step by step, and what becomes of it when it is run.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use ash::vk;
 
 use crate::commands::Commands;
+use crate::instance::Map;
 use crate::log::{self, Event, State};
 use crate::objects::{Image, Objects};
 use crate::pipelines::Pipeline;
@@ -86,7 +87,7 @@ pub(crate) fn follow(objects: &mut Objects, buffer: u64) {
     through(commands, images, buffer);
 }
 
-fn through(all: &HashMap<u64, Commands>, images: &mut HashMap<u64, Image>, buffer: u64) {
+fn through(all: &Map<u64, Commands>, images: &mut Map<u64, Image>, buffer: u64) {
     let Some(commands) = all.get(&buffer) else { return };
     for step in &commands.steps {
         match step {
