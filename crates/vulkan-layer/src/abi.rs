@@ -91,10 +91,14 @@ pub(crate) unsafe fn layer_info(
     }
 }
 
-/// `n` values from `first`; none where that is null.
+/// `n` values from `first`; none where that is null. Of none it may point anywhere.
 ///
 /// # Safety
 /// Where `first` is not null, there are `n`, for as long as `'a` lasts.
 pub(crate) unsafe fn slice<'a, T>(first: *const T, n: u32) -> &'a [T] {
-    if first.is_null() { &[] } else { unsafe { std::slice::from_raw_parts(first, n as usize) } }
+    if n == 0 || first.is_null() {
+        &[]
+    } else {
+        unsafe { std::slice::from_raw_parts(first, n as usize) }
+    }
 }

@@ -1,13 +1,14 @@
-//! Command buffers: what they hold, in its order, apart from draws.
+//! Command buffers: when they are recorded, and what they bind.
 
-use std::ffi::CStr;
+use std::collections::BTreeSet;
+use std::ffi::c_void;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
 use ash::vk::{self, Handle};
 
 use crate::abi::slice;
-use crate::device::{Device, SETTINGS, device};
+use crate::device::{Device, device};
 use crate::dynamic::Dynamic;
 use crate::guard;
 use crate::log::{self, Event};
@@ -15,25 +16,8 @@ use crate::objects::Objects;
 use crate::passes::Begun;
 use crate::pipelines::Pipeline;
 use crate::sets::Sets;
+use crate::steps::Step;
 use crate::table::next;
-
-/// What a command buffer does.
-#[derive(Clone)]
-pub(crate) enum Step {
-    Event(Event),
-    /// Secondary command buffers.
-    Execute(Vec<u64>),
-    /// It waits for an event, which the host may set.
-    Waits,
-}
-
-/// What it does to images' layouts, which are followed whether or not anything is captured.
-pub(crate) enum Move {
-    /// An image is in this layout from here on.
-    Layout(u64, vk::ImageLayout),
-    /// Secondary command buffers.
-    Execute(Vec<u64>),
-}
 
 /// A pass that has begun.
 pub(crate) enum Open {
@@ -46,31 +30,76 @@ pub(crate) enum Open {
 #[derive(Default)]
 pub(crate) struct Commands {
     pub steps: Vec<Step>,
-    pub moves: Vec<Move>,
     pub slots: Vec<u32>,
     pub pipeline: Option<Arc<Pipeline>>,
+    /// The program's own pipeline is bound where ours could be.
+    pub own: bool,
     pub dynamic: Dynamic,
     pub sets: Sets,
     pub open: Option<Open>,
-    /// It is run once, before anything is captured: its draws are the program's own.
+    /// The images of the pass, and why what is drawn in it cannot be told.
+    pub images: BTreeSet<u64>,
+    pub refused: &'static str,
+    /// Its draws may be left out by what lies in a buffer.
+    pub conditional: bool,
+    /// It waits for an event, which the host may set.
+    pub waits: bool,
+    /// Nothing is captured when it is recorded: its draws are the program's own.
     pub plain: bool,
+    /// Why what it does to the images of the pass that it is executed in is not told.
+    pub spoils: &'static str,
+    /// It is being recorded and not plain.
+    recording: bool,
     labels: Vec<String>,
+    /// All labels around what comes now, outermost first.
+    pub label: Arc<str>,
 }
+
+pub(crate) const PLAIN: &str = "draws recorded before the capture was to begin";
+pub(crate) const CONDITIONAL: &str = "it is drawn on a condition that lies in a buffer";
 
 impl Commands {
-    pub(crate) fn clear(&mut self) {
-        *self = Self { slots: std::mem::take(&mut self.slots), ..Self::default() };
+    /// Forgets all but the numbers of draws. Says whether it was being recorded.
+    pub(crate) fn clear(&mut self) -> bool {
+        let slots = std::mem::take(&mut self.slots);
+        std::mem::replace(self, Self { slots, ..Self::default() }).recording
     }
 
-    /// The labels around what comes now.
-    pub(crate) fn label(&self) -> String {
-        self.labels.join(" / ")
+    pub(crate) fn push_label(&mut self, label: String) {
+        self.labels.push(label);
+        self.label = self.labels.join(" / ").into();
+    }
+
+    pub(crate) fn pop_label(&mut self) {
+        self.labels.pop();
+        self.label = self.labels.join(" / ").into();
+    }
+
+    pub(crate) fn write(&mut self, image: u64, command: &str) {
+        let event = Event::Write(log::Write { image, command: command.into() });
+        self.steps.push(Step::Event(event));
+    }
+
+    /// What is done to the images of the pass cannot be told.
+    pub(crate) fn spoil(&mut self, why: &'static str) {
+        for image in self.images.clone() {
+            self.write(image, why);
+        }
+        self.spoils = why;
     }
 }
 
-/// Does something with the commands of a buffer.
+/// Does something with the commands of a buffer, unless it is plain.
 pub(crate) fn with(d: &Device, buffer: vk::CommandBuffer, what: impl FnOnce(&mut Commands)) {
-    with_objects(d, |objects| what(objects.recording(buffer)));
+    if d.idle() {
+        return;
+    }
+    with_objects(d, |objects| {
+        let commands = objects.recording(buffer);
+        if !commands.plain {
+            what(commands);
+        }
+    });
 }
 
 /// Does something with a device's objects.
@@ -96,6 +125,20 @@ pub(crate) unsafe extern "system" fn allocate(
     result
 }
 
+/// Forgets what command buffers hold, and `gone` ones altogether.
+fn reset_all(d: &Device, buffers: impl FnOnce(&mut Objects) -> Vec<u64>, gone: bool) {
+    let pending = d.pending.load(Ordering::Acquire);
+    with_objects(d, |objects| {
+        for buffer in buffers(objects) {
+            let recording = match gone {
+                true => objects.forget(buffer, pending),
+                false => objects.reset(buffer, pending),
+            };
+            d.recorded(recording);
+        }
+    });
+}
+
 pub(crate) unsafe extern "system" fn free(
     handle: vk::Device,
     pool: vk::CommandPool,
@@ -103,14 +146,14 @@ pub(crate) unsafe extern "system" fn free(
     buffers: *const vk::CommandBuffer,
 ) {
     let Some(d) = (unsafe { device(handle) }) else { return };
-    with_objects(&d, |objects| {
-        for buffer in unsafe { slice(buffers, n) } {
-            objects.forget(buffer.as_raw());
-            if let Some(pool) = objects.pools.get_mut(&pool.as_raw()) {
-                pool.retain(|b| *b != buffer.as_raw());
-            }
+    let freed = |objects: &mut Objects| {
+        let all: BTreeSet<u64> = unsafe { slice(buffers, n) }.iter().map(|b| b.as_raw()).collect();
+        if let Some(pool) = objects.pools.get_mut(&pool.as_raw()) {
+            pool.retain(|b| !all.contains(b));
         }
-    });
+        all.into_iter().collect()
+    };
+    reset_all(&d, freed, true);
     next!(d.table.free_command_buffers, handle, pool, n, buffers)
 }
 
@@ -120,11 +163,7 @@ pub(crate) unsafe extern "system" fn destroy_pool(
     allocator: *const vk::AllocationCallbacks<'_>,
 ) {
     let Some(d) = (unsafe { device(handle) }) else { return };
-    with_objects(&d, |objects| {
-        for buffer in objects.pools.remove(&pool.as_raw()).unwrap_or_default() {
-            objects.forget(buffer);
-        }
-    });
+    reset_all(&d, |objects| objects.pools.remove(&pool.as_raw()).unwrap_or_default(), true);
     next!(d.table.destroy_command_pool, handle, pool, allocator)
 }
 
@@ -134,11 +173,8 @@ pub(crate) unsafe extern "system" fn reset_pool(
     flags: vk::CommandPoolResetFlags,
 ) -> vk::Result {
     let Some(d) = (unsafe { device(handle) }) else { return vk::Result::ERROR_DEVICE_LOST };
-    with_objects(&d, |objects| {
-        for buffer in objects.pools.get(&pool.as_raw()).cloned().unwrap_or_default() {
-            objects.reset(buffer);
-        }
-    });
+    let all = |objects: &mut Objects| objects.pools.get(&pool.as_raw()).cloned();
+    reset_all(&d, |objects| all(objects).unwrap_or_default(), false);
     next!(d.table.reset_command_pool, handle, pool, flags)
 }
 
@@ -147,7 +183,7 @@ pub(crate) unsafe extern "system" fn reset(
     flags: vk::CommandBufferResetFlags,
 ) -> vk::Result {
     let Some(d) = (unsafe { device(buffer) }) else { return vk::Result::ERROR_DEVICE_LOST };
-    with_objects(&d, |objects| objects.reset(buffer.as_raw()));
+    reset_all(&d, |_| vec![buffer.as_raw()], false);
     next!(d.table.reset_command_buffer, buffer, flags)
 }
 
@@ -157,13 +193,25 @@ pub(crate) unsafe extern "system" fn begin(
 ) -> vk::Result {
     let Some(d) = (unsafe { device(buffer) }) else { return vk::Result::ERROR_DEVICE_LOST };
     let once = unsafe { (*info).flags }.contains(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
-    let plain = once && !d.soon.load(Ordering::Acquire);
+    let plain = d.over() || once && !d.soon.load(Ordering::Acquire);
     // To begin is to reset.
+    reset_all(&d, |_| vec![buffer.as_raw()], false);
     with_objects(&d, |objects| {
-        objects.reset(buffer.as_raw());
-        objects.recording(buffer).plain = plain;
+        let commands = objects.recording(buffer);
+        (commands.plain, commands.recording) = (plain, !plain);
+        if plain {
+            commands.spoils = PLAIN;
+        } else {
+            d.busy.fetch_add(1, Ordering::AcqRel);
+        }
     });
     next!(d.table.begin, buffer, info)
+}
+
+pub(crate) unsafe extern "system" fn end(buffer: vk::CommandBuffer) -> vk::Result {
+    let Some(d) = (unsafe { device(buffer) }) else { return vk::Result::ERROR_DEVICE_LOST };
+    with(&d, buffer, |commands| d.recorded(std::mem::take(&mut commands.recording)));
+    next!(d.table.end, buffer)
 }
 
 pub(crate) unsafe extern "system" fn bind_pipeline(
@@ -173,17 +221,19 @@ pub(crate) unsafe extern "system" fn bind_pipeline(
 ) {
     let Some(d) = (unsafe { device(buffer) }) else { return };
     let mut ours = pipeline;
-    if point == vk::PipelineBindPoint::GRAPHICS {
+    if point == vk::PipelineBindPoint::GRAPHICS && !d.idle() {
         with_objects(&d, |objects| {
             let bound = objects.pipelines.get(&pipeline.as_raw()).cloned();
             let commands = objects.recording(buffer);
+            if commands.plain {
+                return;
+            }
             if let Some(bound) = &bound
-                && !commands.plain
                 && !bound.ours.is_null()
             {
                 ours = bound.ours;
             }
-            commands.pipeline = bound;
+            (commands.pipeline, commands.own) = (bound, false);
         });
     }
     next!(d.table.bind_pipeline, buffer, point, ours)
@@ -200,14 +250,26 @@ pub(crate) unsafe extern "system" fn bind_sets(
     offsets: *const u32,
 ) {
     let Some(d) = (unsafe { device(buffer) }) else { return };
-    if point == vk::PipelineBindPoint::GRAPHICS {
+    if point == vk::PipelineBindPoint::GRAPHICS && !d.idle() {
         with_objects(&d, |objects| {
-            let Some(info) = objects.layouts.pipeline(layout).cloned() else { return };
+            let info = objects.layouts.pipeline(layout).cloned();
             let (sets, offsets) = unsafe { (slice(sets, n), slice(offsets, offset_count)) };
-            objects.recording(buffer).sets.bind(&info, first, sets, offsets);
+            let bound = &mut objects.recording(buffer).sets;
+            match info {
+                Some(info) => bound.bind(&info, first, sets, offsets),
+                None => bound.lose(first, n),
+            }
         });
     }
     next!(d.table.bind_sets, buffer, point, layout, first, n, sets, offset_count, offsets)
+}
+
+/// The program pushes descriptors for drawing.
+fn push(d: &Device, buffer: vk::CommandBuffer, layout: vk::PipelineLayout, set: u32) {
+    with_objects(d, |objects| {
+        let info = objects.layouts.pipeline(layout).cloned().unwrap_or_default();
+        objects.recording(buffer).sets.push(&info, set);
+    });
 }
 
 pub(crate) unsafe extern "system" fn push_set(
@@ -219,7 +281,9 @@ pub(crate) unsafe extern "system" fn push_set(
     writes: *const vk::WriteDescriptorSet<'_>,
 ) {
     let Some(d) = (unsafe { device(buffer) }) else { return };
-    with(&d, buffer, |commands| commands.sets.push(set));
+    if point == vk::PipelineBindPoint::GRAPHICS && !d.idle() {
+        push(&d, buffer, layout, set);
+    }
     next!(d.table.push_set, buffer, point, layout, set, n, writes)
 }
 
@@ -228,10 +292,12 @@ pub(crate) unsafe extern "system" fn push_set_template(
     template: vk::DescriptorUpdateTemplate,
     layout: vk::PipelineLayout,
     set: u32,
-    data: *const std::ffi::c_void,
+    data: *const c_void,
 ) {
     let Some(d) = (unsafe { device(buffer) }) else { return };
-    with(&d, buffer, |commands| commands.sets.push(set));
+    if !d.idle() && d.objects().templates.contains(&template.as_raw()) {
+        push(&d, buffer, layout, set);
+    }
     next!(d.table.push_set_template, buffer, template, layout, set, data)
 }
 
@@ -241,246 +307,31 @@ pub(crate) unsafe extern "system" fn execute(
     buffers: *const vk::CommandBuffer,
 ) {
     let Some(d) = (unsafe { device(buffer) }) else { return };
-    with(&d, buffer, |commands| {
-        let all: Vec<u64> = unsafe { slice(buffers, n) }.iter().map(|b| b.as_raw()).collect();
-        commands.moves.push(Move::Execute(all.clone()));
-        commands.steps.push(Step::Execute(all));
-        // What they leave bound is undefined.
-        commands.pipeline = None;
-        commands.sets = Sets::default();
-        commands.dynamic = Dynamic::default();
-    });
+    let all: Vec<u64> = unsafe { slice(buffers, n) }.iter().map(|b| b.as_raw()).collect();
+    if !d.over() {
+        with_objects(&d, |objects| {
+            let executed = all.iter().filter_map(|buffer| objects.commands.get(buffer));
+            let (mut spoils, mut waits) = ("", false);
+            for secondary in executed {
+                waits |= secondary.waits;
+                if spoils.is_empty() {
+                    spoils = secondary.spoils;
+                }
+            }
+            let commands = objects.recording(buffer);
+            commands.waits |= waits;
+            if spoils.is_empty() {
+                spoils = if commands.conditional { CONDITIONAL } else { commands.refused };
+            }
+            commands.steps.push(Step::Execute(all.clone()));
+            if !spoils.is_empty() {
+                commands.spoil(spoils);
+            }
+            // What they leave bound is undefined.
+            commands.pipeline = None;
+            commands.sets = Sets::default();
+            commands.dynamic = Dynamic::default();
+        });
+    }
     next!(d.table.execute, buffer, n, buffers)
-}
-
-pub(crate) unsafe extern "system" fn clear_attachments(
-    buffer: vk::CommandBuffer,
-    n: u32,
-    attachments: *const vk::ClearAttachment,
-    rect_count: u32,
-    rects: *const vk::ClearRect,
-) {
-    let Some(d) = (unsafe { device(buffer) }) else { return };
-    with(&d, buffer, |commands| {
-        let (all, rects) = unsafe { (slice(attachments, n), slice(rects, rect_count)) };
-        for clear in all {
-            let depth = clear.aspect_mask.contains(vk::ImageAspectFlags::DEPTH);
-            let colour = clear.aspect_mask.contains(vk::ImageAspectFlags::COLOR)
-                && clear.color_attachment == SETTINGS.location;
-            let value = unsafe { clear.clear_value.color.float32 };
-            for rect in rects.iter().filter(|_| depth || colour) {
-                let (at, size) = (rect.rect.offset, rect.rect.extent);
-                let area = [at.x, at.y, size.width as i32, size.height as i32];
-                let event = Event::Clear(log::Clear { depth, value, area });
-                commands.steps.push(Step::Event(event));
-            }
-        }
-    });
-    next!(d.table.clear_attachments, buffer, n, attachments, rect_count, rects)
-}
-
-/// An image is written by a command that is no draw.
-fn write(d: &Device, buffer: vk::CommandBuffer, image: vk::Image, command: &str) {
-    with_objects(d, |objects| {
-        let Some(image) = objects.image(image).map(|image| image.number) else { return };
-        let event = Event::Write(log::Write { image, command: command.into() });
-        objects.recording(buffer).steps.push(Step::Event(event));
-    });
-}
-
-/// Hooks of commands that write an image. The arguments from its layout on, or a structure.
-macro_rules! writers {
-    ($($hook:ident: $next:ident, $command:literal,
-       ($($before:ident: $bt:ty),*), ($($after:ident: $at:ty),*);)*) => {$(
-        pub(crate) unsafe extern "system" fn $hook(
-            buffer: vk::CommandBuffer, $($before: $bt,)* image: vk::Image, $($after: $at),*
-        ) {
-            let Some(d) = (unsafe { device(buffer) }) else { return };
-            write(&d, buffer, image, $command);
-            next!(d.table.$next, buffer, $($before,)* image, $($after),*)
-        }
-    )*};
-}
-
-writers! {
-    clear_colour_image: clear_colour_image, "vkCmdClearColorImage", (),
-        (layout: vk::ImageLayout, value: *const vk::ClearColorValue, n: u32,
-         ranges: *const vk::ImageSubresourceRange);
-    copy_image: copy_image, "vkCmdCopyImage", (source: vk::Image, from: vk::ImageLayout),
-        (layout: vk::ImageLayout, n: u32, regions: *const vk::ImageCopy);
-    blit_image: blit_image, "vkCmdBlitImage", (source: vk::Image, from: vk::ImageLayout),
-        (layout: vk::ImageLayout, n: u32, regions: *const vk::ImageBlit, filter: vk::Filter);
-    resolve_image: resolve_image, "vkCmdResolveImage", (source: vk::Image, from: vk::ImageLayout),
-        (layout: vk::ImageLayout, n: u32, regions: *const vk::ImageResolve);
-    copy_from_buffer: copy_from_buffer, "vkCmdCopyBufferToImage", (source: vk::Buffer),
-        (layout: vk::ImageLayout, n: u32, regions: *const vk::BufferImageCopy);
-}
-
-macro_rules! writers2 {
-    ($($hook:ident: $next:ident, $command:literal, $info:ty;)*) => {$(
-        pub(crate) unsafe extern "system" fn $hook(buffer: vk::CommandBuffer, info: *const $info) {
-            let Some(d) = (unsafe { device(buffer) }) else { return };
-            write(&d, buffer, unsafe { (*info).dst_image }, $command);
-            next!(d.table.$next, buffer, info)
-        }
-    )*};
-}
-
-writers2! {
-    copy_image2: copy_image2, "vkCmdCopyImage2", vk::CopyImageInfo2<'_>;
-    blit_image2: blit_image2, "vkCmdBlitImage2", vk::BlitImageInfo2<'_>;
-    resolve_image2: resolve_image2, "vkCmdResolveImage2", vk::ResolveImageInfo2<'_>;
-    copy_from_buffer2: copy_from_buffer2, "vkCmdCopyBufferToImage2", vk::CopyBufferToImageInfo2<'_>;
-}
-
-/// Images change their layouts.
-fn transitions(
-    d: &Device,
-    buffer: vk::CommandBuffer,
-    all: impl Iterator<Item = (vk::Image, vk::ImageLayout, vk::ImageLayout)>,
-) {
-    with_objects(d, |objects| {
-        for (image, _, after) in all.filter(|(_, before, after)| before != after) {
-            let Some(image) = objects.image(image).map(|image| image.number) else { continue };
-            objects.recording(buffer).moves.push(Move::Layout(image, after));
-        }
-    });
-}
-
-pub(crate) unsafe extern "system" fn barrier(
-    buffer: vk::CommandBuffer,
-    before: vk::PipelineStageFlags,
-    after: vk::PipelineStageFlags,
-    flags: vk::DependencyFlags,
-    memory_count: u32,
-    memory: *const vk::MemoryBarrier<'_>,
-    buffer_count: u32,
-    buffers: *const vk::BufferMemoryBarrier<'_>,
-    n: u32,
-    images: *const vk::ImageMemoryBarrier<'_>,
-) {
-    let Some(d) = (unsafe { device(buffer) }) else { return };
-    let all = unsafe { slice(images, n) };
-    transitions(&d, buffer, all.iter().map(|b| (b.image, b.old_layout, b.new_layout)));
-    next!(
-        d.table.barrier,
-        buffer,
-        before,
-        after,
-        flags,
-        memory_count,
-        memory,
-        buffer_count,
-        buffers,
-        n,
-        images
-    )
-}
-
-pub(crate) unsafe extern "system" fn barrier2(
-    buffer: vk::CommandBuffer,
-    info: *const vk::DependencyInfo<'_>,
-) {
-    let Some(d) = (unsafe { device(buffer) }) else { return };
-    let dependency = unsafe { &*info };
-    let all =
-        unsafe { slice(dependency.p_image_memory_barriers, dependency.image_memory_barrier_count) };
-    transitions(&d, buffer, all.iter().map(|b| (b.image, b.old_layout, b.new_layout)));
-    next!(d.table.barrier2, buffer, info)
-}
-
-pub(crate) unsafe extern "system" fn wait_events(
-    buffer: vk::CommandBuffer,
-    n: u32,
-    events: *const vk::Event,
-    before: vk::PipelineStageFlags,
-    after: vk::PipelineStageFlags,
-    memory_count: u32,
-    memory: *const vk::MemoryBarrier<'_>,
-    buffer_count: u32,
-    buffers: *const vk::BufferMemoryBarrier<'_>,
-    image_count: u32,
-    images: *const vk::ImageMemoryBarrier<'_>,
-) {
-    let Some(d) = (unsafe { device(buffer) }) else { return };
-    with(&d, buffer, |commands| commands.steps.push(Step::Waits));
-    let all = unsafe { slice(images, image_count) };
-    transitions(&d, buffer, all.iter().map(|b| (b.image, b.old_layout, b.new_layout)));
-    next!(
-        d.table.wait_events,
-        buffer,
-        n,
-        events,
-        before,
-        after,
-        memory_count,
-        memory,
-        buffer_count,
-        buffers,
-        image_count,
-        images
-    )
-}
-
-pub(crate) unsafe extern "system" fn wait_events2(
-    buffer: vk::CommandBuffer,
-    n: u32,
-    events: *const vk::Event,
-    infos: *const vk::DependencyInfo<'_>,
-) {
-    let Some(d) = (unsafe { device(buffer) }) else { return };
-    with(&d, buffer, |commands| commands.steps.push(Step::Waits));
-    for info in unsafe { slice(infos, n) } {
-        let all = unsafe { slice(info.p_image_memory_barriers, info.image_memory_barrier_count) };
-        transitions(&d, buffer, all.iter().map(|b| (b.image, b.old_layout, b.new_layout)));
-    }
-    next!(d.table.wait_events2, buffer, n, events, infos)
-}
-
-pub(crate) unsafe extern "system" fn begin_label(
-    buffer: vk::CommandBuffer,
-    label: *const vk::DebugUtilsLabelEXT<'_>,
-) {
-    let Some(d) = (unsafe { device(buffer) }) else { return };
-    let text = unsafe { (*label).p_label_name };
-    if !text.is_null() {
-        let text = unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned();
-        with(&d, buffer, |commands| commands.labels.push(text));
-    }
-    next!(d.table.begin_label, buffer, label)
-}
-
-pub(crate) unsafe extern "system" fn end_label(buffer: vk::CommandBuffer) {
-    let Some(d) = (unsafe { device(buffer) }) else { return };
-    with(&d, buffer, |commands| drop(commands.labels.pop()));
-    next!(d.table.end_label, buffer)
-}
-
-pub(crate) unsafe extern "system" fn set_name(
-    handle: vk::Device,
-    info: *const vk::DebugUtilsObjectNameInfoEXT<'_>,
-) -> vk::Result {
-    let Some(d) = (unsafe { device(handle) }) else { return vk::Result::ERROR_DEVICE_LOST };
-    with_objects(&d, |objects| {
-        let info = unsafe { &*info };
-        if info.p_object_name.is_null() {
-            return;
-        }
-        let text = unsafe { CStr::from_ptr(info.p_object_name) }.to_string_lossy().into_owned();
-        match info.object_type {
-            vk::ObjectType::IMAGE => {
-                let number = objects.image_numbers.get(&info.object_handle).copied();
-                if let Some(image) = number.and_then(|n| objects.images.get_mut(&n)) {
-                    image.name = text;
-                }
-            }
-            vk::ObjectType::PIPELINE => {
-                if let Some(pipeline) = objects.pipelines.get(&info.object_handle) {
-                    pipeline.rename(text);
-                }
-            }
-            _ => {}
-        }
-    });
-    next!(d.table.set_name, handle, info)
 }

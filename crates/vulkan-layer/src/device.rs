@@ -1,19 +1,23 @@
-//! Devices: what this layer asks of them besides what the program does, and all that belongs to one.
+//! Devices, and all that belongs to one.
 
-use std::ffi::{c_char, c_void};
-use std::sync::atomic::AtomicBool;
-use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError};
+use std::collections::HashMap;
+use std::ffi::{CStr, c_char, c_void};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError, RwLock};
 
-use ash::vk;
+use ash::vk::{self, Handle};
 
-use crate::abi::{DeviceLink, LINK, LOADER_DATA, SetLoaderData, find, layer_info};
-use crate::instance::{ADDRESS, Instance, Physical, Registry, as_next, instance, listed};
-use crate::instance::{enter, leave, of};
-use crate::memory::writable;
+use crate::abi::{DeviceLink, LINK, LOADER_DATA, SetLoaderData, layer_info, slice};
+use crate::creation::{Asked, Enabled};
+use crate::instance::{HIDDEN, Instance, Physical, Registry, enter, instance, leave, most, of};
+use crate::layouts::Counts;
+use crate::memory::Buffer;
 use crate::objects::Objects;
-use crate::recorder::{Recorder, Resources};
+use crate::pending::settle;
+use crate::queues::{Own, Queue};
+use crate::recorder::Recorder;
+use crate::resources::Resources;
 use crate::settings::Settings;
-use crate::submit;
 use crate::table::{DeviceTable, next};
 
 static DEVICES: Registry<Device> = LazyLock::new(Default::default);
@@ -39,11 +43,18 @@ pub(crate) static SETTINGS: LazyLock<Settings> =
 
 pub(crate) struct Device {
     pub handle: vk::Device,
+    pub physical: vk::PhysicalDevice,
+    pub instance: Arc<Instance>,
     pub table: DeviceTable,
     pub memory: vk::PhysicalDeviceMemoryProperties,
     pub set_loader_data: Option<SetLoaderData>,
     /// Where our descriptor set stands: the last place there is.
     pub set_index: u32,
+    /// Descriptors that a pipeline layout can hold.
+    pub most: Counts,
+    /// Pipeline layouts can have sets of no layout. Mesa's lavapipe (its vendor's number is Mesa's
+    /// own) does not stand it that one is bound behind such (22.3), and is content with empty ones.
+    pub null_sets: bool,
     /// Locations between vertex and fragment shaders.
     pub locations: u32,
     /// Whether fragment shaders can ask for the primitive.
@@ -57,6 +68,18 @@ pub(crate) struct Device {
     pub pending: AtomicBool,
     /// Whether something is captured now or in the next frames.
     pub soon: AtomicBool,
+    /// Whether nothing will be captured any more.
+    over: AtomicBool,
+    /// Command buffers that are being recorded and are not plain.
+    pub busy: AtomicUsize,
+    pub queues: RwLock<HashMap<u64, Arc<Queue>>>,
+    own: Mutex<Own>,
+    /// Buffers that a queue may still write to.
+    parked: Mutex<Vec<Buffer>>,
+    /// Nothing of it can be captured: nothing is in the program's way.
+    pub passive: bool,
+    /// The process that made it: a copy of that has its memory, and is not captured.
+    process: u32,
 }
 
 impl Device {
@@ -66,6 +89,51 @@ impl Device {
 
     pub(crate) fn recorder(&self) -> MutexGuard<'_, Recorder> {
         self.recorder.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(crate) fn own(&self) -> MutexGuard<'_, Own> {
+        self.own.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(crate) fn park(&self, buffer: Buffer) {
+        self.parked.lock().unwrap_or_else(PoisonError::into_inner).push(buffer);
+    }
+
+    pub(crate) fn queue(&self, handle: vk::Queue) -> Arc<Queue> {
+        let known = self.queues.read().unwrap_or_else(PoisonError::into_inner);
+        known.get(&handle.as_raw()).cloned().unwrap_or_else(|| Arc::new(Queue::unknown(handle)))
+    }
+
+    /// All queues, in the same order each time: they can be held together.
+    pub(crate) fn all_queues(&self) -> Vec<Arc<Queue>> {
+        let known = self.queues.read().unwrap_or_else(PoisonError::into_inner);
+        let mut all: Vec<_> = known.values().cloned().collect();
+        all.sort_by_key(|queue| queue.handle);
+        all
+    }
+
+    /// Whether nothing that is recorded now is asked for, so that nothing has to be noted of it.
+    pub(crate) fn idle(&self) -> bool {
+        self.busy.load(Ordering::Acquire) == 0
+    }
+
+    pub(crate) fn over(&self) -> bool {
+        self.over.load(Ordering::Acquire)
+    }
+
+    pub(crate) fn at_home(&self) -> bool {
+        self.process == std::process::id()
+    }
+
+    /// A command buffer is not recorded any more; whether it was, and was not plain.
+    pub(crate) fn recorded(&self, recording: bool) {
+        self.busy.fetch_sub(recording.into(), Ordering::AcqRel);
+    }
+
+    /// Looks at what is asked for from now on.
+    pub(crate) fn look(&self, recorder: &Recorder) {
+        self.soon.store(recorder.soon(), Ordering::Release);
+        self.over.store(self.passive || recorder.over(), Ordering::Release);
     }
 }
 
@@ -116,11 +184,19 @@ pub(crate) unsafe extern "system" fn create_device(
             return result;
         }
         let facts = Physical::of(&instance, physical);
-        // The link has moved on, so that a second try begins where the first did.
+        let names = slice((*info).pp_enabled_extension_names, (*info).enabled_extension_count);
+        let past = names.iter().map(|n| CStr::from_ptr(*n)).find(|name| HIDDEN.contains(name));
+        // The link has moved on, so that another try begins where the first did.
         let after = (*link).value;
-        let asked = Asked::of(&instance, &facts, info);
-        let mut result = asked.create(create, physical, info, allocator, out);
-        let mut enabled = asked.enabled;
+        let (mut result, mut enabled) = (vk::Result::ERROR_UNKNOWN, Enabled::default());
+        for address in [true, false] {
+            if past.is_none() && result != vk::Result::SUCCESS {
+                (*link).value = after;
+                let asked = Asked::of(&instance, &facts, info, address);
+                result = asked.create(create, physical, info, allocator, out);
+                enabled = asked.enabled;
+            }
+        }
         if result != vk::Result::SUCCESS {
             (*link).value = after;
             enabled = Enabled::default();
@@ -131,9 +207,19 @@ pub(crate) unsafe extern "system" fn create_device(
         }
         let handle = *out;
         register(handle);
-        let table = DeviceTable::load(|name| get(handle, name));
-        let device = Device::new(handle, table, &facts, enabled, set_loader_data);
-        enter(&DEVICES, handle, device);
+        let made = crate::guard(|| {
+            let table = DeviceTable::load(|name| get(handle, name));
+            let past = past.map(|name| name.to_string_lossy());
+            let able = match past {
+                Some(past) => Err(format!("it draws by {past}")),
+                None if !enabled.atomics => Err("its fragment shaders cannot write memory".into()),
+                None => Ok(enabled),
+            };
+            Device::new(handle, physical, instance, table, &facts, able, set_loader_data)
+        });
+        if let Some(device) = made {
+            enter(&DEVICES, handle, device);
+        }
         result
     }
 }
@@ -147,9 +233,11 @@ pub(crate) unsafe extern "system" fn destroy_device(
     }
     if let Some(device) = unsafe { leave(&DEVICES, handle) } {
         crate::guard(|| {
-            submit::settle(&device);
-            device.recorder().destroy(&device);
+            settle(&device, None);
             device.objects().destroy(&device);
+            device.own().destroy(&device);
+            let parked = device.parked.lock().unwrap_or_else(PoisonError::into_inner);
+            parked.iter().for_each(|buffer| buffer.destroy(device.handle, &device.table));
             device.resources.destroy(&device);
         });
     }
@@ -158,190 +246,40 @@ pub(crate) unsafe extern "system" fn destroy_device(
     }
 }
 
-/// What was got of what recording needs.
-#[derive(Clone, Copy, Default)]
-struct Enabled {
-    /// Fragment shaders can write and count.
-    atomics: bool,
-    geometry: bool,
-    address: bool,
-}
-
-/// A device's create info with what recording needs besides.
-struct Asked {
-    /// Where the program's own features lie, and what they are with ours.
-    features: Option<(*mut vk::PhysicalDeviceFeatures, vk::PhysicalDeviceFeatures)>,
-    /// The same, where they are no part of the chain.
-    own: vk::PhysicalDeviceFeatures,
-    /// The program's own flag of buffers' addresses.
-    flag: Option<*mut vk::Bool32>,
-    /// Whether our own structure for it is put before the chain.
-    structure: bool,
-    extensions: Vec<*const c_char>,
-    enabled: Enabled,
-}
-
-impl Asked {
-    /// # Safety
-    /// `info` is as the program gave it.
-    unsafe fn of(
-        instance: &Instance,
-        facts: &Physical,
-        info: *const vk::DeviceCreateInfo<'_>,
-    ) -> Self {
-        let info = unsafe { &*info };
-        let wanted = |mut f: vk::PhysicalDeviceFeatures| {
-            f.fragment_stores_and_atomics = facts.features.fragment_stores_and_atomics;
-            f.geometry_shader = facts.features.geometry_shader;
-            f
-        };
-        let has = |f: &vk::PhysicalDeviceFeatures| Enabled {
-            atomics: f.fragment_stores_and_atomics == vk::TRUE,
-            geometry: f.geometry_shader == vk::TRUE,
-            address: false,
-        };
-        let s_type = vk::StructureType::PHYSICAL_DEVICE_FEATURES_2;
-        let chained = unsafe { find::<vk::PhysicalDeviceFeatures2<'_>>(info.p_next, s_type) };
-        let mut own = vk::PhysicalDeviceFeatures::default();
-        let mut features = None;
-        let mut enabled = match chained {
-            Some(chained) => {
-                let at = unsafe { &raw mut (*chained).features };
-                let theirs = unsafe { *at };
-                let ours = wanted(theirs);
-                // A program may keep its features where nothing can be written.
-                if writable(at.cast(), size_of_val(&ours)) {
-                    features = Some((at, ours));
-                    has(&ours)
-                } else {
-                    has(&theirs)
-                }
-            }
-            None => {
-                if !info.p_enabled_features.is_null() {
-                    own = unsafe { *info.p_enabled_features };
-                }
-                own = wanted(own);
-                has(&own)
-            }
-        };
-
-        let mut extensions: Vec<*const c_char> = unsafe {
-            crate::abi::slice(info.pp_enabled_extension_names, info.enabled_extension_count)
-                .to_vec()
-        };
-        let (mut flag, mut structure) = (None, false);
-        let possible = SETTINGS.address
-            && facts.address
-            && facts.has(ADDRESS)
-            && instance.version >= vk::API_VERSION_1_1;
-        if possible {
-            flag = unsafe { address_flag(info.p_next) };
-            match flag {
-                Some(at) if unsafe { *at } == vk::TRUE => flag = None,
-                Some(at) if !writable(at.cast(), 4) => flag = None,
-                Some(_) => {}
-                None => structure = true,
-            }
-            enabled.address = flag.is_some()
-                || structure
-                || unsafe { address_flag(info.p_next).is_some_and(|at| *at == vk::TRUE) };
-            let names =
-                unsafe { listed(info.pp_enabled_extension_names, info.enabled_extension_count) };
-            if enabled.address && !names.iter().any(|name| name.to_bytes() == ADDRESS.as_bytes()) {
-                extensions.push(c"VK_KHR_buffer_device_address".as_ptr());
-            }
-        }
-        Self { features, own, flag, structure, extensions, enabled }
-    }
-
-    /// # Safety
-    /// As the program's own call.
-    unsafe fn create(
-        &self,
-        create: vk::PFN_vkCreateDevice,
-        physical: vk::PhysicalDevice,
-        info: *const vk::DeviceCreateInfo<'_>,
-        allocator: *const vk::AllocationCallbacks<'_>,
-        out: *mut vk::Device,
-    ) -> vk::Result {
-        unsafe {
-            let mut ours = *info;
-            ours.enabled_extension_count = self.extensions.len() as u32;
-            ours.pp_enabled_extension_names = self.extensions.as_ptr();
-            let mut structure = vk::PhysicalDeviceBufferDeviceAddressFeatures::default()
-                .buffer_device_address(true);
-            if self.structure {
-                structure.p_next = ours.p_next.cast_mut();
-                ours.p_next = as_next(&structure);
-            }
-            let theirs = self.features.map(|(at, ours)| (at, at.replace(ours)));
-            if find::<c_void>((*info).p_next, vk::StructureType::PHYSICAL_DEVICE_FEATURES_2)
-                .is_none()
-            {
-                ours.p_enabled_features = &self.own;
-            }
-            let flag = self.flag.map(|at| (at, at.replace(vk::TRUE)));
-            let result = create(physical, &ours, allocator, out);
-            // The program finds its structures as they were.
-            if let Some((at, value)) = theirs {
-                *at = value;
-            }
-            if let Some((at, value)) = flag {
-                *at = value;
-            }
-            result
-        }
-    }
-}
-
-/// Where a chain says whether buffers have addresses.
-///
-/// # Safety
-/// As [`find`].
-unsafe fn address_flag(chain: *const c_void) -> Option<*mut vk::Bool32> {
-    use vk::StructureType as S;
-    unsafe {
-        let all = find::<vk::PhysicalDeviceVulkan12Features<'_>>(
-            chain,
-            S::PHYSICAL_DEVICE_VULKAN_1_2_FEATURES,
-        );
-        let alone = find::<vk::PhysicalDeviceBufferDeviceAddressFeatures<'_>>(
-            chain,
-            S::PHYSICAL_DEVICE_BUFFER_DEVICE_ADDRESS_FEATURES,
-        );
-        all.map(|f| &raw mut (*f).buffer_device_address)
-            .or(alone.map(|f| &raw mut (*f).buffer_device_address))
-    }
-}
-
 impl Device {
+    /// Where nothing can be captured, the log says so if it can be written.
     fn new(
         handle: vk::Device,
+        physical: vk::PhysicalDevice,
+        instance: Arc<Instance>,
         table: DeviceTable,
         facts: &Physical,
-        enabled: Enabled,
+        able: Result<Enabled, String>,
         set_loader_data: Option<SetLoaderData>,
     ) -> Self {
         let limits = &facts.properties.limits;
         let mut recorder = Recorder::open(&SETTINGS, &facts.properties);
-        let made = if enabled.atomics {
+        let made = able.and_then(|enabled| {
             Resources::new(handle, &table, facts, enabled.address, &SETTINGS)
-        } else {
-            Err("its fragment shaders cannot write memory".into())
-        };
-        let resources = made.unwrap_or_else(|why| {
+                .map(|resources| (enabled, resources))
+        });
+        let (enabled, resources) = made.unwrap_or_else(|why| {
             recorder.note(&format!("nothing of this device is captured: {why}"));
-            Resources::none()
+            (Enabled::default(), Resources::none())
         });
         recorder.begin(resources.capacity());
+        let passive = recorder.over() || !resources.usable();
         let soon = recorder.soon();
         Self {
             handle,
+            physical,
+            instance,
             table,
             memory: facts.memory,
             set_loader_data,
             set_index: limits.max_bound_descriptor_sets - 1,
+            most: most(limits),
+            null_sets: facts.properties.vendor_id != vk::VendorId::MESA.as_raw() as u32,
             locations: limits
                 .max_vertex_output_components
                 .min(limits.max_fragment_input_components)
@@ -352,6 +290,13 @@ impl Device {
             recorder: Mutex::new(recorder),
             pending: AtomicBool::new(false),
             soon: AtomicBool::new(soon),
+            over: AtomicBool::new(passive),
+            passive,
+            busy: AtomicUsize::new(0),
+            queues: RwLock::default(),
+            own: Mutex::default(),
+            parked: Mutex::default(),
+            process: std::process::id(),
         }
     }
 }

@@ -1,12 +1,12 @@
 //! Draws: each gets a number, which its fragments carry.
 
-use ash::vk;
+use ash::vk::{self, Handle};
 
-use crate::commands::{Step, with_objects};
+use crate::commands::{CONDITIONAL, with_objects};
 use crate::device::{Device, device};
 use crate::guard;
-use crate::log::{self, Event};
-use crate::pipelines::Pipeline;
+use crate::objects::OVERFLOW;
+use crate::steps::{Drawn, Step};
 use crate::table::next;
 
 /// A draw about to be recorded.
@@ -21,43 +21,56 @@ struct Command {
 
 /// Numbers a draw and binds our set for it.
 fn before(d: &Device, buffer: vk::CommandBuffer, command: Command) {
+    if d.idle() {
+        return;
+    }
     let mut full = false;
     with_objects(d, |objects| {
-        let commands = objects.commands.entry(vk::Handle::as_raw(buffer)).or_default();
+        let commands = objects.commands.entry(buffer.as_raw()).or_default();
         let Some(pipeline) = commands.pipeline.clone() else { return };
-        let recorded = pipeline.refused.is_empty() && !commands.plain;
-        let slot = if recorded { objects.slots.take() } else { None };
-        full = slot.is_none() && recorded;
+        if commands.plain || pipeline.discards {
+            return;
+        }
+        let layout = objects.layouts.pipeline(pipeline.layout);
+        let recorded = pipeline.refused.is_empty();
+        let lost = recorded && layout.is_some_and(|layout| commands.sets.would_lose(layout));
+        let slot = if recorded && !lost { objects.slots.take() } else { None };
+        full = recorded && !lost && slot.is_none();
         let refused = match () {
-            () if !pipeline.refused.is_empty() => &*pipeline.refused,
-            () if commands.plain => PLAIN,
+            () if !recorded => "",
+            () if lost => PUSHED,
             () if full => FULL,
-            () => command.refused,
+            () if !command.refused.is_empty() => command.refused,
+            () if commands.conditional => CONDITIONAL,
+            () => commands.refused,
         };
         commands.slots.extend(slot);
-        let draw = log::Draw {
+        commands.steps.push(Step::Draw(Drawn {
             slot: slot.unwrap_or(u32::MAX),
-            pipeline: pipeline.number,
-            command: command.name.into(),
+            pipeline: pipeline.clone(),
+            command: command.name,
             vertices: command.vertices,
             instances: command.instances,
             state: pipeline.fixed.with(&commands.dynamic),
-            refused: refused.into(),
-            label: commands.label(),
-        };
-        commands.steps.push(Step::Event(Event::Draw(draw)));
-        let Some(layout) = objects.layouts.pipeline(pipeline.layout) else { return };
+            refused,
+            label: commands.label.clone(),
+        }));
+        // Ours cannot do without our set.
+        if lost != commands.own && !pipeline.ours.is_null() {
+            let bound = if lost { pipeline.theirs } else { pipeline.ours };
+            let () = next!(d.table.bind_pipeline, buffer, GRAPHICS, bound);
+            commands.own = lost;
+        }
+        let Some(layout) = layout else { return };
         let bind = |at: u32, set: vk::DescriptorSet, offsets: &[u32]| {
             let n = offsets.len() as u32;
-            let point = vk::PipelineBindPoint::GRAPHICS;
             let (layout, offsets) = (pipeline.layout, offsets.as_ptr());
-            let () = next!(d.table.bind_sets, buffer, point, layout, at, 1, &set, n, offsets);
+            let () = next!(d.table.bind_sets, buffer, GRAPHICS, layout, at, 1, &set, n, offsets);
         };
         for (at, set, offsets) in commands.sets.again(layout) {
             bind(at, set, &offsets);
         }
-        // Where there is no number left, that of all such draws.
-        let number = slot.or(full.then_some(crate::recorder::SLOTS - 1));
+        let number = slot.or(full.then_some(OVERFLOW));
         if let Some((set, offset)) = number.and_then(|slot| d.resources.bind(slot)) {
             bind(d.set_index, set, &[offset]);
             commands.sets.disturb(layout);
@@ -68,18 +81,46 @@ fn before(d: &Device, buffer: vk::CommandBuffer, command: Command) {
     }
 }
 
-const PLAIN: &str = "it was recorded before the capture was to begin";
-const FULL: &str = "more draws are recorded at a time than can be told apart";
+const GRAPHICS: vk::PipelineBindPoint = vk::PipelineBindPoint::GRAPHICS;
 
-/// The pipeline that is bound.
-fn bound(d: &Device, buffer: vk::CommandBuffer) -> Option<std::sync::Arc<Pipeline>> {
-    guard(|| d.objects().recording(buffer).pipeline.clone()).flatten()
+const FULL: &str = "more draws are recorded at a time than can be told apart";
+const PUSHED: &str = "it leaves pushed descriptors alone, which our set would disturb";
+
+/// Whether the parts of a multi-draw of `n` can be drawn one by one: not where a shader asks which of
+/// them it is in.
+fn apart(d: &Device, buffer: vk::CommandBuffer, n: u32) -> Apart {
+    let all = || {
+        let mut objects = d.objects();
+        let left = objects.slots.left();
+        let commands = objects.recording(buffer);
+        let pipeline = commands.pipeline.as_ref().filter(|p| p.refused.is_empty());
+        match pipeline {
+            Some(_) if n <= 1 || commands.plain => Apart::AtOnce,
+            Some(p) if p.draw_index => Apart::Refused(INDEXED_BY_DRAW),
+            Some(_) if n > left => Apart::Refused(FULL),
+            Some(_) => Apart::Each,
+            None => Apart::AtOnce,
+        }
+    };
+    if d.idle() { Apart::AtOnce } else { guard(all).unwrap_or(Apart::AtOnce) }
 }
 
-/// Whether the parts of a multi-draw can be drawn one by one: not where a shader asks which of them
-/// it is in.
-fn apart(d: &Device, buffer: vk::CommandBuffer) -> bool {
-    bound(d, buffer).is_some_and(|p| !p.draw_index && p.refused.is_empty())
+/// How a multi-draw is drawn.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Apart {
+    /// As the program has it: one draw to us.
+    AtOnce,
+    Refused(&'static str),
+    Each,
+}
+
+impl Apart {
+    fn why(self) -> &'static str {
+        match self {
+            Self::Refused(why) => why,
+            Self::AtOnce | Self::Each => "",
+        }
+    }
 }
 
 const INDEXED_BY_DRAW: &str =
@@ -124,7 +165,8 @@ macro_rules! indirect {
         ) {
             let Some(d) = (unsafe { device(buffer) }) else { return };
             let command = Command { name: $name, ..Command::default() };
-            if n > 1 && apart(&d, buffer) {
+            let apart = apart(&d, buffer, n);
+            if apart == Apart::Each {
                 for at in 0..u64::from(n) {
                     before(&d, buffer, command);
                     let offset = offset + at * u64::from(stride);
@@ -132,8 +174,7 @@ macro_rules! indirect {
                 }
                 return;
             }
-            let refused = if n > 1 { INDEXED_BY_DRAW } else { "" };
-            before(&d, buffer, Command { refused, ..command });
+            before(&d, buffer, Command { refused: apart.why(), ..command });
             next!(d.table.$next, buffer, from, offset, n, stride)
         }
     )*};
@@ -185,14 +226,12 @@ pub(crate) unsafe extern "system" fn draw_byte_count(
     next!(next, buffer, instances, first_instance, counter, counter_offset, offset, stride)
 }
 
-/// Why the parts of a multi-draw have to be drawn at once. Of several instances a driver may draw all
-/// parts of one after the other (Mesa's lavapipe 22.3 does), in which the picture would change.
-fn together(d: &Device, buffer: vk::CommandBuffer, n: u32, instances: u32) -> Option<&'static str> {
-    match () {
-        () if n <= 1 => None,
-        () if !apart(d, buffer) => Some(INDEXED_BY_DRAW),
-        () if instances > 1 => Some(SEVERAL),
-        () => None,
+/// How one of several instances is drawn. Of such a driver may draw all parts of one instance after
+/// the other (Mesa's lavapipe 22.3 does), in which the picture would change.
+fn instanced(d: &Device, buffer: vk::CommandBuffer, n: u32, instances: u32) -> Apart {
+    match apart(d, buffer, n) {
+        Apart::Each if instances > 1 => Apart::Refused(SEVERAL),
+        apart => apart,
     }
 }
 
@@ -212,8 +251,10 @@ pub(crate) unsafe extern "system" fn draw_multi(
     let Some(d) = (unsafe { device(buffer) }) else { return };
     let name = "vkCmdDrawMultiEXT";
     let next = d.table.draw_multi;
-    if let Some(refused) = together(&d, buffer, n, instances) {
-        before(&d, buffer, Command { name, instances, refused, vertices: 0 });
+    let apart = instanced(&d, buffer, n, instances);
+    if apart != Apart::Each {
+        let vertices = if n == 1 { unsafe { (*draws).vertex_count } } else { 0 };
+        before(&d, buffer, Command { name, instances, refused: apart.why(), vertices });
         return next!(next, buffer, n, draws, instances, first_instance, stride);
     }
     for part in 0..n {
@@ -236,8 +277,10 @@ pub(crate) unsafe extern "system" fn draw_multi_indexed(
     let Some(d) = (unsafe { device(buffer) }) else { return };
     let name = "vkCmdDrawMultiIndexedEXT";
     let next = d.table.draw_multi_indexed;
-    if let Some(refused) = together(&d, buffer, n, instances) {
-        before(&d, buffer, Command { name, instances, refused, vertices: 0 });
+    let apart = instanced(&d, buffer, n, instances);
+    if apart != Apart::Each {
+        let vertices = if n == 1 { unsafe { (*draws).index_count } } else { 0 };
+        before(&d, buffer, Command { name, instances, refused: apart.why(), vertices });
         return next!(next, buffer, n, draws, instances, first_instance, stride, offset);
     }
     for part in 0..n {

@@ -23,6 +23,7 @@ pub(crate) struct Dynamic {
     pub depth_op: Option<i32>,
     pub stencil_test: Option<bool>,
     pub stencil_fails: Option<bool>,
+    pub bounds: Option<bool>,
 }
 
 /// A pipeline's state, of which some parts are dynamic.
@@ -43,6 +44,7 @@ impl Static {
         let is = |which: D| self.dynamic.contains(&which);
         let mut state = self.state.clone();
         let (mut test, mut fails) = (self.stencil_test, self.stencil_fails);
+        let mut bounds = self.bounds;
         let put = |which: D, target: &mut bool, value: Option<bool>| {
             if is(which) {
                 *target = value.unwrap_or(*target);
@@ -56,6 +58,7 @@ impl Static {
         put(D::DEPTH_WRITE_ENABLE, &mut state.depth_write, set.depth_write);
         put(D::STENCIL_TEST_ENABLE, &mut test, set.stencil_test);
         put(D::STENCIL_OP, &mut fails, set.stencil_fails);
+        put(D::DEPTH_BOUNDS_TEST_ENABLE, &mut bounds, set.bounds);
         if let Some([s, d, op, sa, da, opa]) =
             set.equation.filter(|_| is(D::COLOR_BLEND_EQUATION_EXT))
         {
@@ -74,7 +77,7 @@ impl Static {
         if let Some(op) = set.depth_op.filter(|_| is(D::DEPTH_COMPARE_OP)) {
             state.depth_op = op;
         }
-        state.stencil = test && fails || self.bounds;
+        state.stencil = test && fails || bounds;
         state
     }
 }
@@ -101,6 +104,7 @@ setters! {
     depth_write: set_depth_write, depth_write, |value: vk::Bool32| value == vk::TRUE;
     depth_op: set_depth_op, depth_op, |value: vk::CompareOp| value.as_raw();
     stencil_test: set_stencil_test, stencil_test, |value: vk::Bool32| value == vk::TRUE;
+    bounds: set_bounds, bounds, |value: vk::Bool32| value == vk::TRUE;
     logic_op: set_logic_op, logic_op, |value: vk::Bool32| value == vk::TRUE;
     alpha_to_coverage: set_alpha_to_coverage, alpha_to_coverage, |value: vk::Bool32| value == vk::TRUE;
 }

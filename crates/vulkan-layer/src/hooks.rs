@@ -5,7 +5,8 @@ use std::ffi::{CStr, c_char};
 use ash::vk;
 
 use crate::device::{self, create_device, destroy_device};
-use crate::{commands, draws, dynamic, images, instance, layouts, passes, pipelines, submit};
+use crate::{barriers, commands, draws, dynamic, images, instance, layouts};
+use crate::{passes, pipelines, queues, submit, writes};
 
 /// Functions by name.
 macro_rules! hooks {
@@ -41,14 +42,19 @@ hooks! {
     device_hook {
         b"vkGetDeviceProcAddr" => get_device_proc_addr,
         b"vkDestroyDevice" => destroy_device,
-        b"vkGetDeviceQueue" => submit::get_queue,
-        b"vkGetDeviceQueue2" => submit::get_queue2,
+        b"vkGetDeviceQueue" => queues::get_queue,
+        b"vkGetDeviceQueue2" => queues::get_queue2,
 
         b"vkCreateImage" => images::create_image,
         b"vkDestroyImage" => images::destroy_image,
+        b"vkGetDeviceImageMemoryRequirements" | b"vkGetDeviceImageMemoryRequirementsKHR"
+            => images::requirements,
         b"vkCreateImageView" => images::create_image_view,
         b"vkDestroyImageView" => images::destroy_image_view,
         b"vkCreateSwapchainKHR" => images::create_swapchain,
+        b"vkCreateSharedSwapchainsKHR" => images::create_swapchains,
+        b"vkAcquireNextImageKHR" => images::acquire,
+        b"vkAcquireNextImage2KHR" => images::acquire2,
         b"vkDestroySwapchainKHR" => images::destroy_swapchain,
         b"vkGetSwapchainImagesKHR" => images::swapchain_images,
 
@@ -66,6 +72,14 @@ hooks! {
         b"vkCmdBeginRendering" | b"vkCmdBeginRenderingKHR" => passes::begin_rendering,
         b"vkCmdEndRendering" | b"vkCmdEndRenderingKHR" => passes::end_rendering,
 
+        b"vkCmdSetRenderingAttachmentLocations" | b"vkCmdSetRenderingAttachmentLocationsKHR"
+            => passes::set_locations,
+
+        b"vkCreateDescriptorUpdateTemplate" | b"vkCreateDescriptorUpdateTemplateKHR"
+            => layouts::create_template,
+        b"vkDestroyDescriptorUpdateTemplate" | b"vkDestroyDescriptorUpdateTemplateKHR"
+            => layouts::destroy_template,
+        b"vkDestroyDescriptorSetLayout" => layouts::destroy_set_layout,
         b"vkCreateDescriptorSetLayout" => layouts::create_set_layout,
         b"vkCreatePipelineLayout" => layouts::create_pipeline_layout,
         b"vkDestroyPipelineLayout" => layouts::destroy_pipeline_layout,
@@ -81,25 +95,30 @@ hooks! {
         b"vkResetCommandPool" => commands::reset_pool,
         b"vkResetCommandBuffer" => commands::reset,
         b"vkBeginCommandBuffer" => commands::begin,
+        b"vkEndCommandBuffer" => commands::end,
         b"vkCmdBindPipeline" => commands::bind_pipeline,
         b"vkCmdBindDescriptorSets" => commands::bind_sets,
-        b"vkCmdPushDescriptorSetKHR" => commands::push_set,
-        b"vkCmdPushDescriptorSetWithTemplateKHR" => commands::push_set_template,
+        b"vkCmdPushDescriptorSet" | b"vkCmdPushDescriptorSetKHR" => commands::push_set,
+        b"vkCmdPushDescriptorSetWithTemplate" | b"vkCmdPushDescriptorSetWithTemplateKHR"
+            => commands::push_set_template,
         b"vkCmdExecuteCommands" => commands::execute,
-        b"vkCmdClearAttachments" => commands::clear_attachments,
-        b"vkCmdClearColorImage" => commands::clear_colour_image,
-        b"vkCmdCopyImage" => commands::copy_image,
-        b"vkCmdCopyImage2" | b"vkCmdCopyImage2KHR" => commands::copy_image2,
-        b"vkCmdBlitImage" => commands::blit_image,
-        b"vkCmdBlitImage2" | b"vkCmdBlitImage2KHR" => commands::blit_image2,
-        b"vkCmdResolveImage" => commands::resolve_image,
-        b"vkCmdResolveImage2" | b"vkCmdResolveImage2KHR" => commands::resolve_image2,
-        b"vkCmdCopyBufferToImage" => commands::copy_from_buffer,
-        b"vkCmdCopyBufferToImage2" | b"vkCmdCopyBufferToImage2KHR" => commands::copy_from_buffer2,
-        b"vkCmdPipelineBarrier" => commands::barrier,
-        b"vkCmdPipelineBarrier2" | b"vkCmdPipelineBarrier2KHR" => commands::barrier2,
-        b"vkCmdWaitEvents" => commands::wait_events,
-        b"vkCmdWaitEvents2" | b"vkCmdWaitEvents2KHR" => commands::wait_events2,
+        b"vkCmdBeginConditionalRenderingEXT" => writes::begin_condition,
+        b"vkCmdEndConditionalRenderingEXT" => writes::end_condition,
+        b"vkCmdClearDepthStencilImage" => writes::clear_depth_image,
+        b"vkCmdClearAttachments" => writes::clear_attachments,
+        b"vkCmdClearColorImage" => writes::clear_colour_image,
+        b"vkCmdCopyImage" => writes::copy_image,
+        b"vkCmdCopyImage2" | b"vkCmdCopyImage2KHR" => writes::copy_image2,
+        b"vkCmdBlitImage" => writes::blit_image,
+        b"vkCmdBlitImage2" | b"vkCmdBlitImage2KHR" => writes::blit_image2,
+        b"vkCmdResolveImage" => writes::resolve_image,
+        b"vkCmdResolveImage2" | b"vkCmdResolveImage2KHR" => writes::resolve_image2,
+        b"vkCmdCopyBufferToImage" => writes::copy_from_buffer,
+        b"vkCmdCopyBufferToImage2" | b"vkCmdCopyBufferToImage2KHR" => writes::copy_from_buffer2,
+        b"vkCmdPipelineBarrier" => barriers::barrier,
+        b"vkCmdPipelineBarrier2" | b"vkCmdPipelineBarrier2KHR" => barriers::barrier2,
+        b"vkCmdWaitEvents" => barriers::wait_events,
+        b"vkCmdWaitEvents2" | b"vkCmdWaitEvents2KHR" => barriers::wait_events2,
 
         b"vkCmdDraw" => draws::draw,
         b"vkCmdDrawIndexed" => draws::draw_indexed,
@@ -124,27 +143,34 @@ hooks! {
         b"vkCmdSetDepthTestEnable" | b"vkCmdSetDepthTestEnableEXT" => dynamic::depth_test,
         b"vkCmdSetDepthWriteEnable" | b"vkCmdSetDepthWriteEnableEXT" => dynamic::depth_write,
         b"vkCmdSetDepthCompareOp" | b"vkCmdSetDepthCompareOpEXT" => dynamic::depth_op,
+        b"vkCmdSetDepthBoundsTestEnable" | b"vkCmdSetDepthBoundsTestEnableEXT" => dynamic::bounds,
         b"vkCmdSetStencilTestEnable" | b"vkCmdSetStencilTestEnableEXT" => dynamic::stencil_test,
         b"vkCmdSetStencilOp" | b"vkCmdSetStencilOpEXT" => dynamic::stencil_op,
 
         b"vkQueueSubmit" => submit::queue_submit,
         b"vkQueueSubmit2" | b"vkQueueSubmit2KHR" => submit::queue_submit2,
+        b"vkQueueBindSparse" => submit::bind_sparse,
         b"vkQueuePresentKHR" => submit::present,
         b"vkQueueWaitIdle" => submit::queue_wait_idle,
         b"vkDeviceWaitIdle" => submit::device_wait_idle,
+        b"vkGetFenceStatus" => submit::fence_status,
         b"vkWaitForFences" => submit::wait_fences,
         b"vkWaitSemaphores" | b"vkWaitSemaphoresKHR" => submit::wait_semaphores,
         b"vkCreateSemaphore" => submit::create_semaphore,
         b"vkDestroySemaphore" => submit::destroy_semaphore,
+        b"vkImportSemaphoreFdKHR" => submit::import_semaphore,
+        b"vkQueueBeginDebugUtilsLabelEXT" => queues::begin_label,
+        b"vkQueueEndDebugUtilsLabelEXT" => queues::end_label,
+        b"vkQueueInsertDebugUtilsLabelEXT" => queues::insert_label,
     }
 }
 
 hooks! {
     /// Of names that programs give: heard whether or not the driver listens.
     label_hook {
-        b"vkCmdBeginDebugUtilsLabelEXT" => commands::begin_label,
-        b"vkCmdEndDebugUtilsLabelEXT" => commands::end_label,
-        b"vkSetDebugUtilsObjectNameEXT" => commands::set_name,
+        b"vkCmdBeginDebugUtilsLabelEXT" => barriers::begin_label,
+        b"vkCmdEndDebugUtilsLabelEXT" => barriers::end_label,
+        b"vkSetDebugUtilsObjectNameEXT" => barriers::set_name,
     }
 }
 
@@ -191,7 +217,7 @@ pub(crate) unsafe extern "system" fn get_device_proc_addr(
     let text = unsafe { CStr::from_ptr(name) };
     let next = unsafe { device::next(handle, name) };
     match unsafe { device::device(handle) } {
-        Some(_) => of_device(text, next),
-        None => next.and_then(|_| passive_hook(text)).or(next),
+        Some(device) if !device.passive => of_device(text, next),
+        _ => next.and_then(|_| passive_hook(text)).or(next),
     }
 }

@@ -2,16 +2,58 @@
 
 use ash::vk::{self, Handle};
 
-use crate::abi::slice;
+use crate::abi::{chain, slice};
 use crate::device::{Device, device};
 use crate::guard;
 use crate::objects::{Image, Swapchain, View};
 use crate::table::next;
 
-/// Usage of images that can be drawn into, and be read when they are.
-fn readable(usage: vk::ImageUsageFlags) -> bool {
-    use vk::ImageUsageFlags as U;
-    usage.contains(U::COLOR_ATTACHMENT) && !usage.contains(U::TRANSIENT_ATTACHMENT)
+/// Usage with which an image can be copied from.
+const READ: vk::ImageUsageFlags = vk::ImageUsageFlags::TRANSFER_SRC;
+
+/// Whether the pixels of an image can be copied where the driver lets it: it is drawn into, and its
+/// memory and layout are its own.
+fn wanted(info: &vk::ImageCreateInfo<'_>) -> bool {
+    use vk::{ImageCreateFlags as F, ImageUsageFlags as U, StructureType as S};
+    let shared = F::ALIAS | F::PROTECTED | F::SPARSE_BINDING | F::SPARSE_RESIDENCY;
+    let elsewhere = [
+        S::EXTERNAL_MEMORY_IMAGE_CREATE_INFO,
+        S::EXTERNAL_MEMORY_IMAGE_CREATE_INFO_NV,
+        S::IMAGE_SWAPCHAIN_CREATE_INFO_KHR,
+    ];
+    let own = unsafe { chain(info.p_next).all(|s| !elsewhere.contains(&(*s).s_type)) };
+    info.usage.contains(U::COLOR_ATTACHMENT)
+        && !info.usage.contains(U::TRANSIENT_ATTACHMENT)
+        && !info.flags.intersects(shared)
+        && info.tiling != vk::ImageTiling::DRM_FORMAT_MODIFIER_EXT
+        && own
+}
+
+/// An image's create info with our usage added, where that can be done.
+fn readable<'a>(d: &Device, info: &vk::ImageCreateInfo<'a>) -> Option<vk::ImageCreateInfo<'a>> {
+    let ours = vk::ImageCreateInfo { usage: info.usage | READ, ..*info };
+    if !wanted(info) || ours.usage == info.usage {
+        return wanted(info).then_some(ours);
+    }
+    let mut most = vk::ImageFormatProperties::default();
+    let result: vk::Result = next!(
+        d.instance.table.image_format,
+        d.physical,
+        ours.format,
+        ours.image_type,
+        ours.tiling,
+        ours.usage,
+        ours.flags,
+        &mut most
+    );
+    let (size, limit) = (ours.extent, most.max_extent);
+    let fits = size.width <= limit.width
+        && size.height <= limit.height
+        && size.depth <= limit.depth
+        && ours.mip_levels <= most.max_mip_levels
+        && ours.array_layers <= most.max_array_layers
+        && most.sample_counts.contains(ours.samples);
+    (result == vk::Result::SUCCESS && fits).then_some(ours)
 }
 
 pub(crate) unsafe extern "system" fn create_image(
@@ -22,16 +64,9 @@ pub(crate) unsafe extern "system" fn create_image(
 ) -> vk::Result {
     let Some(d) = (unsafe { device(handle) }) else { return vk::Result::ERROR_DEVICE_LOST };
     let theirs = unsafe { &*info };
-    let mut ours = *theirs;
-    let mut read = readable(theirs.usage);
-    if read {
-        ours.usage |= vk::ImageUsageFlags::TRANSFER_SRC;
-    }
-    let mut result: vk::Result = next!(d.table.create_image, handle, &ours, allocator, out);
-    if result != vk::Result::SUCCESS && ours.usage != theirs.usage {
-        read = false;
-        result = next!(d.table.create_image, handle, info, allocator, out);
-    }
+    let ours = guard(|| readable(&d, theirs)).flatten();
+    let made = ours.as_ref().map_or(info, std::ptr::from_ref);
+    let result: vk::Result = next!(d.table.create_image, handle, made, allocator, out);
     let attachment = vk::ImageUsageFlags::COLOR_ATTACHMENT
         | vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT
         | vk::ImageUsageFlags::INPUT_ATTACHMENT;
@@ -44,12 +79,28 @@ pub(crate) unsafe extern "system" fn create_image(
             extent: theirs.extent,
             samples: theirs.samples.as_raw(),
             swapchain: false,
-            readable: read,
-            layout: theirs.initial_layout,
+            acquired: false,
+            readable: ours.is_some(),
+            layout: vk::ImageLayout::UNDEFINED,
         };
         guard(|| enter(&d, image));
     }
     result
+}
+
+/// What an image would need has to be what it does need.
+pub(crate) unsafe extern "system" fn requirements(
+    handle: vk::Device,
+    info: *const vk::DeviceImageMemoryRequirements<'_>,
+    out: *mut vk::MemoryRequirements2<'_>,
+) {
+    let Some(d) = (unsafe { device(handle) }) else { return };
+    let mut info = unsafe { *info };
+    let ours = guard(|| readable(&d, unsafe { &*info.p_create_info })).flatten();
+    if let Some(ours) = &ours {
+        info.p_create_info = ours;
+    }
+    next!(d.table.image_requirements, handle, &info, out)
 }
 
 fn enter(d: &Device, image: Image) -> u64 {
@@ -67,6 +118,8 @@ pub(crate) unsafe extern "system" fn destroy_image(
 ) {
     let Some(d) = (unsafe { device(handle) }) else { return };
     guard(|| {
+        // It may be being copied.
+        let _held = d.recorder();
         let mut objects = d.objects();
         if let Some(number) = objects.image_numbers.remove(&image.as_raw()) {
             objects.images.remove(&number);
@@ -108,6 +161,30 @@ pub(crate) unsafe extern "system" fn destroy_image_view(
     next!(d.table.destroy_image_view, handle, view, allocator)
 }
 
+/// Whether a swapchain's images can be copied from: asked beforehand, since a swapchain that cannot
+/// be made takes the one before it along.
+fn shown_readable(d: &Device, info: &vk::SwapchainCreateInfoKHR<'_>) -> bool {
+    let shared =
+        [vk::PresentModeKHR::SHARED_DEMAND_REFRESH, vk::PresentModeKHR::SHARED_CONTINUOUS_REFRESH];
+    let mut can = vk::SurfaceCapabilitiesKHR::default();
+    let result: vk::Result = next!(d.instance.table.surface, d.physical, info.surface, &mut can);
+    result == vk::Result::SUCCESS
+        && can.supported_usage_flags.contains(READ)
+        && !info.flags.contains(vk::SwapchainCreateFlagsKHR::PROTECTED)
+        && !shared.contains(&info.present_mode)
+}
+
+fn made_swapchain(
+    d: &Device,
+    info: &vk::SwapchainCreateInfoKHR<'_>,
+    handle: vk::SwapchainKHR,
+    readable: bool,
+) {
+    let (format, extent) = (info.image_format, info.image_extent);
+    let swapchain = Swapchain { format, extent, readable, images: Vec::new() };
+    d.objects().swapchains.insert(handle.as_raw(), swapchain);
+}
+
 pub(crate) unsafe extern "system" fn create_swapchain(
     handle: vk::Device,
     info: *const vk::SwapchainCreateInfoKHR<'_>,
@@ -115,20 +192,34 @@ pub(crate) unsafe extern "system" fn create_swapchain(
     out: *mut vk::SwapchainKHR,
 ) -> vk::Result {
     let Some(d) = (unsafe { device(handle) }) else { return vk::Result::ERROR_DEVICE_LOST };
-    let theirs = unsafe { &*info };
-    let mut ours = *theirs;
-    ours.image_usage |= vk::ImageUsageFlags::TRANSFER_SRC;
-    let mut readable = true;
-    let mut result: vk::Result = next!(d.table.create_swapchain, handle, &ours, allocator, out);
-    if result != vk::Result::SUCCESS && ours.image_usage != theirs.image_usage {
-        readable = false;
-        result = next!(d.table.create_swapchain, handle, info, allocator, out);
+    let mut ours = unsafe { *info };
+    let readable = guard(|| shown_readable(&d, &ours)).unwrap_or(false);
+    if readable {
+        ours.image_usage |= READ;
     }
+    let result: vk::Result = next!(d.table.create_swapchain, handle, &ours, allocator, out);
+    if result == vk::Result::SUCCESS {
+        guard(|| made_swapchain(&d, &ours, unsafe { *out }, readable));
+    }
+    result
+}
+
+/// Swapchains of displays, which are made together: as they are asked for.
+pub(crate) unsafe extern "system" fn create_swapchains(
+    handle: vk::Device,
+    n: u32,
+    infos: *const vk::SwapchainCreateInfoKHR<'_>,
+    allocator: *const vk::AllocationCallbacks<'_>,
+    out: *mut vk::SwapchainKHR,
+) -> vk::Result {
+    let Some(d) = (unsafe { device(handle) }) else { return vk::Result::ERROR_DEVICE_LOST };
+    let result = next!(d.table.create_swapchains, handle, n, infos, allocator, out);
     if result == vk::Result::SUCCESS {
         guard(|| {
-            let (format, extent) = (theirs.image_format, theirs.image_extent);
-            let swapchain = Swapchain { format, extent, readable, images: Vec::new() };
-            d.objects().swapchains.insert(unsafe { (*out).as_raw() }, swapchain);
+            let (infos, made) = unsafe { (slice(infos, n), slice(out, n)) };
+            for (info, made) in infos.iter().zip(made) {
+                made_swapchain(&d, info, *made, info.image_usage.contains(READ));
+            }
         });
     }
     result
@@ -141,6 +232,7 @@ pub(crate) unsafe extern "system" fn destroy_swapchain(
 ) {
     let Some(d) = (unsafe { device(handle) }) else { return };
     guard(|| {
+        let _held = d.recorder();
         let mut objects = d.objects();
         for number in objects.swapchains.remove(&swapchain.as_raw()).iter().flat_map(|s| &s.images)
         {
@@ -160,7 +252,8 @@ pub(crate) unsafe extern "system" fn swapchain_images(
 ) -> vk::Result {
     let Some(d) = (unsafe { device(handle) }) else { return vk::Result::ERROR_DEVICE_LOST };
     let result = next!(d.table.swapchain_images, handle, swapchain, count, out);
-    if out.is_null() {
+    let some = result == vk::Result::SUCCESS || result == vk::Result::INCOMPLETE;
+    if out.is_null() || !some {
         return result;
     }
     guard(|| {
@@ -176,6 +269,7 @@ pub(crate) unsafe extern "system" fn swapchain_images(
                 extent: vk::Extent3D::from(made.extent),
                 samples: 1,
                 swapchain: true,
+                acquired: false,
                 readable: made.readable,
                 layout: vk::ImageLayout::UNDEFINED,
             };
@@ -185,5 +279,57 @@ pub(crate) unsafe extern "system" fn swapchain_images(
             }
         }
     });
+    result
+}
+
+/// A swapchain's image is the program's from here on.
+fn acquired(d: &Device, swapchain: vk::SwapchainKHR, semaphore: vk::Semaphore, index: u32) {
+    if d.over() {
+        return;
+    }
+    guard(|| {
+        let mut objects = d.objects();
+        // No queue signals it.
+        objects.semaphores.entry(semaphore.as_raw()).or_default().signalled = false;
+        let swapchain = objects.swapchains.get(&swapchain.as_raw());
+        let number = swapchain.and_then(|s| s.images.get(index as usize)).copied();
+        if let Some(image) = number.and_then(|n| objects.images.get_mut(&n)) {
+            image.acquired = true;
+        }
+    });
+}
+
+/// Whether an image was acquired.
+fn got(result: vk::Result) -> bool {
+    result == vk::Result::SUCCESS || result == vk::Result::SUBOPTIMAL_KHR
+}
+
+pub(crate) unsafe extern "system" fn acquire(
+    handle: vk::Device,
+    swapchain: vk::SwapchainKHR,
+    timeout: u64,
+    semaphore: vk::Semaphore,
+    fence: vk::Fence,
+    out: *mut u32,
+) -> vk::Result {
+    let Some(d) = (unsafe { device(handle) }) else { return vk::Result::ERROR_DEVICE_LOST };
+    let result = next!(d.table.acquire, handle, swapchain, timeout, semaphore, fence, out);
+    if got(result) {
+        acquired(&d, swapchain, semaphore, unsafe { *out });
+    }
+    result
+}
+
+pub(crate) unsafe extern "system" fn acquire2(
+    handle: vk::Device,
+    info: *const vk::AcquireNextImageInfoKHR<'_>,
+    out: *mut u32,
+) -> vk::Result {
+    let Some(d) = (unsafe { device(handle) }) else { return vk::Result::ERROR_DEVICE_LOST };
+    let result = next!(d.table.acquire2, handle, info, out);
+    if got(result) {
+        let info = unsafe { &*info };
+        acquired(&d, info.swapchain, info.semaphore, unsafe { *out });
+    }
     result
 }

@@ -1,12 +1,14 @@
 //! Instances: the way down to the driver, and what programs are told of devices.
 
-use std::collections::{BTreeMap, HashMap};
-use std::ffi::{CStr, c_char, c_void};
+use std::collections::{BTreeSet, HashMap};
+use std::ffi::{CStr, CString, c_char};
+use std::hash::{BuildHasherDefault, Hasher};
 use std::sync::{Arc, LazyLock, PoisonError, RwLock};
 
 use ash::vk::{self, Handle};
 
-use crate::abi::{InstanceLink, LINK, layer_info, slice};
+use crate::abi::{InstanceLink, LINK, layer_info};
+use crate::layouts::Counts;
 use crate::table::{InstanceTable, next};
 
 pub(crate) struct Instance {
@@ -17,9 +19,35 @@ pub(crate) struct Instance {
     pub version: u32,
 }
 
+/// Pointers are spread well enough as they are.
+#[derive(Default)]
+pub(crate) struct Keys(u64);
+
+impl Hasher for Keys {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|byte| self.write_u64(u64::from(*byte)));
+    }
+
+    fn write_u64(&mut self, n: u64) {
+        // The map looks at the upper bits, too.
+        self.0 = (self.0 ^ n).wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(32);
+    }
+
+    fn write_usize(&mut self, n: usize) {
+        self.write_u64(n as u64);
+    }
+}
+
+/// By handles and pointers.
+pub(crate) type Map<K, T> = HashMap<K, T, BuildHasherDefault<Keys>>;
+
 /// By what a dispatchable handle points at: the loader's table, which is one for an instance and its
 /// physical devices, and one for a device, its queues and command buffers.
-pub(crate) type Registry<T> = LazyLock<RwLock<HashMap<usize, Arc<T>>>>;
+pub(crate) type Registry<T> = LazyLock<RwLock<Map<usize, Arc<T>>>>;
 
 static INSTANCES: Registry<Instance> = LazyLock::new(Default::default);
 
@@ -98,8 +126,9 @@ pub(crate) unsafe extern "system" fn destroy_instance(
 }
 
 /// Extensions with which a program draws past what this layer rewrites: shaders that are no part of
-/// a pipeline or no text, descriptors that are no sets, commands that a GPU makes, mesh shaders.
-const HIDDEN: [&CStr; 8] = [
+/// a pipeline or no text, descriptors that are no sets, commands that a GPU makes, mesh shaders, sets
+/// that are bound by other commands.
+pub(crate) const HIDDEN: [&CStr; 9] = [
     c"VK_EXT_shader_object",
     c"VK_EXT_descriptor_buffer",
     c"VK_EXT_shader_module_identifier",
@@ -108,6 +137,7 @@ const HIDDEN: [&CStr; 8] = [
     c"VK_EXT_mesh_shader",
     c"VK_NV_mesh_shader",
     c"VK_KHR_pipeline_binary",
+    c"VK_KHR_maintenance6",
 ];
 
 pub(crate) unsafe extern "system" fn enumerate_extensions(
@@ -178,13 +208,44 @@ pub(crate) fn name(chars: &[c_char]) -> &CStr {
     CStr::from_bytes_until_nul(bytes).unwrap_or_default()
 }
 
-/// The fewest descriptor sets that any device has.
-const FEWEST_SETS: u32 = 4;
+/// Lowers a limit by what is ours, where programs do not count on it: not below what every device
+/// has.
+fn withhold(limit: &mut u32, ours: u32, least: u32) {
+    *limit = limit.saturating_sub(ours).max(least.min(*limit));
+}
 
-/// One set fewer than there are, where programs do not count on it: the last is this layer's.
-fn withhold_set(properties: &mut vk::PhysicalDeviceProperties) {
-    let sets = &mut properties.limits.max_bound_descriptor_sets;
-    *sets = (*sets - 1).max(FEWEST_SETS.min(*sets));
+/// Of Vulkan, the last version of which all commands are known here.
+const NEWEST: u32 = vk::make_api_version(0, 1, 4, 0);
+
+/// A device without what is this layer's: the last descriptor set, and what is in it.
+fn withhold_all(properties: &mut vk::PhysicalDeviceProperties) {
+    if properties.api_version >= NEWEST {
+        properties.api_version =
+            vk::make_api_version(0, 1, 3, vk::api_version_patch(properties.api_version));
+    }
+    let (limits, ours) = (&mut properties.limits, Counts::ours());
+    withhold(&mut limits.max_bound_descriptor_sets, 1, 4);
+    let dynamic = &mut limits.max_descriptor_set_uniform_buffers_dynamic;
+    withhold(dynamic, ours.dynamic_uniforms, 8);
+    withhold(&mut limits.max_descriptor_set_uniform_buffers, ours.uniforms, 72);
+    withhold(&mut limits.max_descriptor_set_storage_buffers, ours.storages, 24);
+    withhold(&mut limits.max_per_stage_descriptor_uniform_buffers, ours.stage_uniforms, 12);
+    withhold(&mut limits.max_per_stage_descriptor_storage_buffers, ours.stage_storages, 4);
+    withhold(&mut limits.max_per_stage_resources, ours.stage_all, 128);
+    withhold(&mut limits.max_fragment_combined_output_resources, ours.outputs, 4);
+}
+
+/// What there really is of what our set takes.
+pub(crate) fn most(limits: &vk::PhysicalDeviceLimits) -> Counts {
+    Counts {
+        dynamic_uniforms: limits.max_descriptor_set_uniform_buffers_dynamic,
+        uniforms: limits.max_descriptor_set_uniform_buffers,
+        storages: limits.max_descriptor_set_storage_buffers,
+        stage_uniforms: limits.max_per_stage_descriptor_uniform_buffers,
+        stage_storages: limits.max_per_stage_descriptor_storage_buffers,
+        stage_all: limits.max_per_stage_resources,
+        outputs: limits.max_fragment_combined_output_resources,
+    }
 }
 
 pub(crate) unsafe extern "system" fn properties(
@@ -193,7 +254,7 @@ pub(crate) unsafe extern "system" fn properties(
 ) {
     let Some(instance) = (unsafe { instance(physical) }) else { return };
     let () = next!(instance.table.properties, physical, out);
-    withhold_set(unsafe { &mut *out });
+    withhold_all(unsafe { &mut *out });
 }
 
 pub(crate) unsafe extern "system" fn properties2(
@@ -202,7 +263,7 @@ pub(crate) unsafe extern "system" fn properties2(
 ) {
     let Some(instance) = (unsafe { instance(physical) }) else { return };
     let () = next!(instance.table.properties2, physical, out);
-    withhold_set(unsafe { &mut (*out).properties });
+    withhold_all(unsafe { &mut (*out).properties });
 }
 
 /// What of a device decides how it can be recorded.
@@ -212,7 +273,7 @@ pub(crate) struct Physical {
     pub features: vk::PhysicalDeviceFeatures,
     /// Whether buffers can have addresses, by the features that it names.
     pub address: bool,
-    extensions: BTreeMap<String, ()>,
+    extensions: BTreeSet<CString>,
 }
 
 impl Physical {
@@ -225,12 +286,10 @@ impl Physical {
         let mut features = vk::PhysicalDeviceFeatures::default();
         let () = next!(table.features, handle, &mut features);
         let extensions = extensions(instance, handle).unwrap_or_default();
-        let extensions: BTreeMap<_, _> = extensions
-            .iter()
-            .map(|e| (name(&e.extension_name).to_string_lossy().into_owned(), ()))
-            .collect();
+        let extensions: BTreeSet<CString> =
+            extensions.iter().map(|e| name(&e.extension_name).to_owned()).collect();
         let mut address = false;
-        if table.features2.is_some() && extensions.contains_key(ADDRESS) {
+        if table.features2.is_some() && extensions.contains(ADDRESS) {
             let mut asked = vk::PhysicalDeviceBufferDeviceAddressFeatures::default();
             let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut asked);
             let () = next!(table.features2, handle, &mut all);
@@ -239,23 +298,35 @@ impl Physical {
         Self { properties, memory, features, address, extensions }
     }
 
-    pub(crate) fn has(&self, extension: &str) -> bool {
-        self.extensions.contains_key(extension)
+    pub(crate) fn has(&self, extension: &CStr) -> bool {
+        self.extensions.contains(extension)
     }
 }
 
 /// The extension of buffers' addresses.
-pub(crate) const ADDRESS: &str = "VK_KHR_buffer_device_address";
+pub(crate) const ADDRESS: &CStr = c"VK_KHR_buffer_device_address";
 
-/// The names of extensions that a create info lists.
-///
-/// # Safety
-/// The list is as Vulkan demands it.
-pub(crate) unsafe fn listed<'a>(names: *const *const c_char, n: u32) -> Vec<&'a CStr> {
-    unsafe { slice(names, n).iter().map(|name| CStr::from_ptr(*name)).collect() }
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// Marks a chain's end; for structures that are put before one.
-pub(crate) fn as_next<T>(structure: &T) -> *const c_void {
-    std::ptr::from_ref(structure).cast()
+    #[test]
+    fn limits_are_lowered_but_not_below_what_programs_count_on() {
+        for (limit, shown) in [(4, 4), (5, 4), (32, 31), (3, 3)] {
+            let mut left = limit;
+            withhold(&mut left, 1, 4);
+            assert_eq!(left, shown);
+        }
+        let mut properties = vk::PhysicalDeviceProperties {
+            api_version: vk::make_api_version(0, 1, 4, 7),
+            limits: vk::PhysicalDeviceLimits {
+                max_per_stage_resources: 1000,
+                ..Default::default()
+            },
+            ..Default::default()
+        };
+        withhold_all(&mut properties);
+        assert!(properties.api_version < NEWEST);
+        assert_eq!(properties.limits.max_per_stage_resources, 998);
+    }
 }

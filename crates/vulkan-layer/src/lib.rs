@@ -13,7 +13,10 @@
 //! as it came.
 
 pub mod abi;
+mod barriers;
+mod batches;
 mod commands;
+mod creation;
 mod device;
 mod draws;
 mod dynamic;
@@ -25,16 +28,25 @@ pub mod log;
 mod memory;
 mod objects;
 mod passes;
+mod pending;
 mod pictures;
 mod pipelines;
+mod queues;
 mod recorder;
+mod resources;
+mod rewrite;
 mod sets;
 pub mod settings;
 pub mod spirv;
+mod state;
+mod steps;
 mod submit;
 mod table;
+mod twins;
 mod wire;
+mod writes;
 
+use std::io::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 pub use ash::vk;
@@ -43,6 +55,11 @@ pub use wire::Wire;
 /// Does something of ours; a panic ends here.
 fn guard<T>(what: impl FnOnce() -> T) -> Option<T> {
     catch_unwind(AssertUnwindSafe(what)).ok()
+}
+
+/// Tells the user something. Standard error may be closed.
+fn say(text: &str) {
+    let _ = writeln!(std::io::stderr(), "screendoor: {text}");
 }
 
 /// What the loader asks of a layer first: its version of the interface and its two functions.

@@ -6,7 +6,7 @@ use ash::vk;
 
 use crate::table::{DeviceTable, next};
 
-/// A buffer that is mapped for as long as it lives.
+/// A buffer that is mapped for as long as it lives. Null until it is made.
 pub(crate) struct Buffer {
     pub handle: vk::Buffer,
     memory: vk::DeviceMemory,
@@ -21,6 +21,18 @@ pub(crate) struct Buffer {
 unsafe impl Send for Buffer {}
 unsafe impl Sync for Buffer {}
 
+impl Default for Buffer {
+    fn default() -> Self {
+        Self {
+            handle: vk::Buffer::null(),
+            memory: vk::DeviceMemory::null(),
+            bytes: std::ptr::null_mut(),
+            size: 0,
+            address: 0,
+        }
+    }
+}
+
 impl Buffer {
     pub(crate) fn new(
         device: vk::Device,
@@ -34,13 +46,7 @@ impl Buffer {
         let result: vk::Result =
             next!(table.create_buffer, device, &info, std::ptr::null(), &mut handle);
         result.result()?;
-        let mut this = Self {
-            handle,
-            memory: vk::DeviceMemory::null(),
-            bytes: std::ptr::null_mut(),
-            size,
-            address: 0,
-        };
+        let mut this = Self { handle, size, ..Self::default() };
         match this.back(device, table, types, usage) {
             Ok(()) => Ok(this),
             Err(result) => {

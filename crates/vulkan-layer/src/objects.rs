@@ -1,17 +1,18 @@
 //! What there is of the program's objects: images and views, passes and framebuffers, layouts,
 //! shaders, pipelines and command buffers, each by its handle.
 
-use std::collections::HashMap;
+use std::collections::HashSet;
 use std::sync::Arc;
 
 use ash::vk::{self, Handle};
 
 use crate::commands::Commands;
 use crate::device::Device;
+use crate::instance::Map;
 use crate::layouts::Layouts;
 use crate::log;
 use crate::pipelines::Pipeline;
-use crate::recorder::SLOTS;
+use crate::resources::SLOTS;
 
 /// An image that can be drawn into.
 #[derive(Clone)]
@@ -23,9 +24,11 @@ pub(crate) struct Image {
     pub extent: vk::Extent3D,
     pub samples: u32,
     pub swapchain: bool,
+    /// Of a swapchain: it is the program's now.
+    pub acquired: bool,
     /// Whether its pixels can be copied from it.
     pub readable: bool,
-    /// As it is after all that has been submitted.
+    /// Of its first level and layer, after all that has been submitted.
     pub layout: vk::ImageLayout,
 }
 
@@ -74,6 +77,8 @@ pub(crate) struct Subpass {
 pub(crate) struct RenderPass {
     pub attachments: Vec<AttachmentInfo>,
     pub subpasses: Vec<Subpass>,
+    /// Why what is drawn in it cannot be told; empty where it can.
+    pub refused: &'static str,
 }
 
 #[derive(Clone, Default)]
@@ -92,26 +97,37 @@ pub(crate) struct Swapchain {
     pub images: Vec<u64>,
 }
 
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Semaphore {
+    /// It holds a counter.
+    pub timeline: bool,
+    /// Others may signal it than this device's queues.
+    pub foreign: bool,
+    /// Of one without a counter: a queue was given what signals it, and that may wait for what the
+    /// program does later.
+    pub signalled: bool,
+    pub late: bool,
+}
+
 #[derive(Default)]
 pub(crate) struct Objects {
     numbers: u64,
-    pub images: HashMap<u64, Image>,
+    pub images: Map<u64, Image>,
     /// Numbers of images by handle: a handle may be used again.
-    pub image_numbers: HashMap<u64, u64>,
-    pub views: HashMap<u64, View>,
-    pub swapchains: HashMap<u64, Swapchain>,
-    pub passes: HashMap<u64, Arc<RenderPass>>,
-    pub framebuffers: HashMap<u64, Arc<Framebuffer>>,
-    pub shaders: HashMap<u64, Arc<[u32]>>,
+    pub image_numbers: Map<u64, u64>,
+    pub views: Map<u64, View>,
+    pub swapchains: Map<u64, Swapchain>,
+    pub passes: Map<u64, Arc<RenderPass>>,
+    pub framebuffers: Map<u64, Arc<Framebuffer>>,
+    pub shaders: Map<u64, Arc<[u32]>>,
     pub layouts: Layouts,
-    pub pipelines: HashMap<u64, Arc<Pipeline>>,
-    pub commands: HashMap<u64, Commands>,
+    pub pipelines: Map<u64, Arc<Pipeline>>,
+    pub commands: Map<u64, Commands>,
     /// Command buffers of each pool.
-    pub pools: HashMap<u64, Vec<u64>>,
-    /// Semaphores that hold a counter.
-    pub timelines: std::collections::HashSet<u64>,
-    /// Queue families by queue.
-    pub queues: HashMap<u64, u32>,
+    pub pools: Map<u64, Vec<u64>>,
+    pub semaphores: Map<u64, Semaphore>,
+    /// Of update templates that push descriptors for drawing: by which.
+    pub templates: HashSet<u64>,
     pub slots: Slots,
 }
 
@@ -132,18 +148,26 @@ impl Objects {
         self.commands.entry(buffer.as_raw()).or_default()
     }
 
+    /// The labels around what a command buffer does now.
+    pub(crate) fn label(&self, buffer: vk::CommandBuffer) -> String {
+        self.commands.get(&buffer.as_raw()).map_or_else(String::new, |c| c.label.to_string())
+    }
+
     /// Forgets what a command buffer holds.
-    pub(crate) fn reset(&mut self, buffer: u64) {
-        if let Some(commands) = self.commands.get_mut(&buffer) {
-            self.slots.give_back(&mut commands.slots);
-            commands.clear();
-        }
+    /// Draws' numbers are kept back while something is `pending`: its records may have them.
+    /// Says whether it was being recorded.
+    pub(crate) fn reset(&mut self, buffer: u64, pending: bool) -> bool {
+        self.commands.get_mut(&buffer).is_some_and(|commands| {
+            self.slots.give_back(&mut commands.slots, pending);
+            commands.clear()
+        })
     }
 
     /// Forgets a command buffer.
-    pub(crate) fn forget(&mut self, buffer: u64) {
-        self.reset(buffer);
+    pub(crate) fn forget(&mut self, buffer: u64, pending: bool) -> bool {
+        let recording = self.reset(buffer, pending);
         self.commands.remove(&buffer);
+        recording
     }
 
     pub(crate) fn destroy(&mut self, device: &Device) {
@@ -151,11 +175,16 @@ impl Objects {
     }
 }
 
+/// The number of draws that get none of their own.
+pub(crate) const OVERFLOW: u32 = SLOTS - 1;
+
 /// Draws' numbers, each given to one draw at a time.
 #[derive(Default)]
 pub(crate) struct Slots {
     fresh: u32,
     free: Vec<u32>,
+    /// Free as soon as nothing is pending.
+    kept: Vec<u32>,
 }
 
 impl Slots {
@@ -163,13 +192,23 @@ impl Slots {
     pub(crate) fn take(&mut self) -> Option<u32> {
         self.free.pop().or_else(|| {
             let slot = self.fresh;
-            self.fresh = (slot + 1).min(SLOTS);
-            (slot < SLOTS).then_some(slot)
+            self.fresh = (slot + 1).min(OVERFLOW);
+            (slot < OVERFLOW).then_some(slot)
         })
     }
 
-    fn give_back(&mut self, slots: &mut Vec<u32>) {
-        self.free.append(slots);
+    /// How many there are still.
+    pub(crate) fn left(&self) -> u32 {
+        OVERFLOW - self.fresh + self.free.len() as u32
+    }
+
+    fn give_back(&mut self, slots: &mut Vec<u32>, pending: bool) {
+        if pending { self.kept.append(slots) } else { self.free.append(slots) }
+    }
+
+    /// Nothing is pending any more.
+    pub(crate) fn release(&mut self) {
+        self.free.append(&mut self.kept);
     }
 }
 
@@ -181,8 +220,10 @@ mod tests {
     fn a_slot_is_given_once() {
         let mut slots = Slots::default();
         let mut all: Vec<u32> = std::iter::from_fn(|| slots.take()).collect();
-        assert_eq!(all, (0..SLOTS).collect::<Vec<_>>());
-        slots.give_back(&mut all);
-        assert!(slots.take().is_some() && all.is_empty());
+        assert_eq!(all, (0..OVERFLOW).collect::<Vec<_>>());
+        slots.give_back(&mut all, true);
+        assert!(slots.take().is_none() && all.is_empty());
+        slots.release();
+        assert!(slots.take().is_some());
     }
 }

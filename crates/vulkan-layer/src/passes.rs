@@ -1,20 +1,49 @@
 //! Render passes and framebuffers, as they are made and as they are begun.
 
+use std::ffi::c_void;
 use std::sync::Arc;
 
 use ash::vk::{self, Handle};
 
 use crate::abi::{find, slice};
-use crate::commands::{Move, Open, Step, with_objects};
-use crate::device::{SETTINGS, device};
+use crate::commands::{Commands, Open, PLAIN, with, with_objects};
+use crate::device::{Device, SETTINGS, device};
 use crate::guard;
 use crate::log;
 use crate::objects::{AttachmentInfo, Framebuffer, Objects, RenderPass, Subpass};
+use crate::steps::Step;
 use crate::table::next;
+
+/// Why nothing is told of a pass of which one fragment may be several pixels.
+pub(crate) const RATED: &str = "its fragments may be larger than pixels";
+
+/// Whether a chain of a pass says how large fragments are.
+unsafe fn rated(chain: *const c_void) -> bool {
+    use vk::StructureType as S;
+    unsafe {
+        let rate = find::<vk::FragmentShadingRateAttachmentInfoKHR<'_>>(
+            chain,
+            S::FRAGMENT_SHADING_RATE_ATTACHMENT_INFO_KHR,
+        );
+        let rate = rate.and_then(|r| (*r).p_fragment_shading_rate_attachment.as_ref());
+        let rendering = find::<vk::RenderingFragmentShadingRateAttachmentInfoKHR<'_>>(
+            chain,
+            S::RENDERING_FRAGMENT_SHADING_RATE_ATTACHMENT_INFO_KHR,
+        );
+        let map = find::<vk::RenderingFragmentDensityMapAttachmentInfoEXT<'_>>(
+            chain,
+            S::RENDERING_FRAGMENT_DENSITY_MAP_ATTACHMENT_INFO_EXT,
+        );
+        rate.is_some_and(|r| r.attachment != vk::ATTACHMENT_UNUSED)
+            || rendering.is_some_and(|r| !(*r).image_view.is_null())
+            || map.is_some_and(|m| !(*m).image_view.is_null())
+            || find::<c_void>(chain, S::RENDER_PASS_FRAGMENT_DENSITY_MAP_CREATE_INFO_EXT).is_some()
+    }
+}
 
 /// The hooks of both versions of a render pass: their structures have fields of one name.
 macro_rules! create_pass {
-    ($hook:ident, $next:ident, $info:ty, $reference:ty, |$subpass:ident, $all:ident, $n:ident| $views:expr) => {
+    ($hook:ident, $next:ident, $info:ty, $reference:ty, |$subpass:ident, $all:ident, $n:ident| $views:expr, $rated:expr) => {
         pub(crate) unsafe extern "system" fn $hook(
             handle: vk::Device,
             info: *const $info,
@@ -52,7 +81,8 @@ macro_rules! create_pass {
                         }
                     })
                     .collect();
-                let pass = RenderPass { attachments, subpasses };
+                let refused = if rated($all.p_next) || $rated { RATED } else { "" };
+                let pass = RenderPass { attachments, subpasses, refused };
                 d.objects().passes.insert((*out).as_raw(), Arc::new(pass));
             });
             result
@@ -70,7 +100,8 @@ create_pass!(
         let masks = find::<vk::RenderPassMultiviewCreateInfo<'_>>(all.p_next, s_type);
         let masks = masks.map_or(&[][..], |m| slice((*m).p_view_masks, (*m).subpass_count));
         masks.get(n).map_or(0, |mask| mask.count_ones())
-    }
+    },
+    false
 );
 
 create_pass!(
@@ -81,7 +112,8 @@ create_pass!(
     |subpass, all, n| {
         let _ = n;
         subpass.view_mask.count_ones()
-    }
+    },
+    slice(all.p_subpasses, all.subpass_count).iter().any(|subpass| rated(subpass.p_next))
 );
 
 pub(crate) unsafe extern "system" fn destroy_render_pass(
@@ -159,6 +191,27 @@ fn attachment(
     })
 }
 
+const UNKNOWN: &str = "what its pass draws into is not known";
+
+/// The image of a view that begins with its first level and layer.
+fn first(objects: &Objects, view: u64) -> Option<u64> {
+    let view = objects.views.get(&view)?;
+    (view.layer == 0 && view.level == 0).then_some(view.image)
+}
+
+/// A pass, or a subpass of one, begins.
+fn enter(commands: &mut Commands, pass: Option<log::Pass>, refused: &'static str) {
+    commands.refused = refused;
+    let Some(pass) = pass else { return };
+    let images = [&pass.colour, &pass.resolve, &pass.depth].into_iter().flatten();
+    commands.images = images.map(|a| a.image).collect();
+    if commands.plain {
+        commands.spoil(PLAIN);
+    } else {
+        commands.steps.push(Step::Event(log::Event::Pass(pass)));
+    }
+}
+
 /// A pass of a render pass, begun in a command buffer.
 #[derive(Clone, Default)]
 pub(crate) struct Begun {
@@ -200,17 +253,28 @@ impl Begun {
         Some(pass)
     }
 
+    /// Why its draws cannot be told; empty where they can.
+    fn refused(&self, objects: &Objects) -> &'static str {
+        let Some(subpass) = self.pass.subpasses.get(self.subpass) else { return UNKNOWN };
+        let all = subpass.colours.iter().chain(&subpass.resolve).chain(&subpass.depth);
+        let known =
+            |n: &u32| self.views.get(*n as usize).is_some_and(|v| objects.views.contains_key(v));
+        if all.into_iter().all(known) { self.pass.refused } else { UNKNOWN }
+    }
+
     /// The layouts in which its images are after it.
     fn layouts(&self, objects: &Objects) -> Vec<(u64, vk::ImageLayout)> {
-        let image = |n: usize| objects.views.get(self.views.get(n)?).map(|view| view.image);
+        let image = |n: usize| first(objects, *self.views.get(n)?);
         let all = self.pass.attachments.iter().enumerate();
         all.filter_map(|(n, info)| Some((image(n)?, info.after))).collect()
     }
 }
 
-unsafe fn begin(buffer: vk::CommandBuffer, info: *const vk::RenderPassBeginInfo<'_>) {
-    let Some(d) = (unsafe { device(buffer) }) else { return };
-    with_objects(&d, |objects| {
+unsafe fn begin(d: &Device, buffer: vk::CommandBuffer, info: *const vk::RenderPassBeginInfo<'_>) {
+    if d.over() {
+        return;
+    }
+    with_objects(d, |objects| {
         let info = unsafe { &*info };
         let pass = objects.passes.get(&info.render_pass.as_raw()).cloned().unwrap_or_default();
         let made =
@@ -233,39 +297,44 @@ unsafe fn begin(buffer: vk::CommandBuffer, info: *const vk::RenderPassBeginInfo<
             clears: clears.iter().map(clear_value).collect(),
             ..Begun::default()
         };
-        let label = objects.recording(buffer).label();
-        let entered = begun.enter(objects, label);
+        let entered = begun.enter(objects, objects.label(buffer));
+        let refused = begun.refused(objects);
         let commands = objects.recording(buffer);
         commands.open = Some(Open::Pass(begun));
-        commands.steps.extend(entered.map(|pass| Step::Event(log::Event::Pass(pass))));
+        enter(commands, entered, refused);
     });
 }
 
-fn next_subpass(buffer: vk::CommandBuffer) {
-    let Some(d) = (unsafe { device(buffer) }) else { return };
-    with_objects(&d, |objects| {
-        let commands = objects.recording(buffer);
-        let label = commands.label();
-        let Some(Open::Pass(mut begun)) = commands.open.take() else { return };
+fn next_subpass(d: &Device, buffer: vk::CommandBuffer) {
+    if d.over() {
+        return;
+    }
+    with_objects(d, |objects| {
+        let Some(Open::Pass(mut begun)) = objects.recording(buffer).open.take() else { return };
         begun.subpass += 1;
-        let entered = begun.enter(objects, label);
+        let entered = begun.enter(objects, objects.label(buffer));
+        let refused = begun.refused(objects);
         let commands = objects.recording(buffer);
         commands.open = Some(Open::Pass(begun));
-        commands.steps.extend(entered.map(|pass| Step::Event(log::Event::Pass(pass))));
+        enter(commands, entered, refused);
     });
 }
 
-fn end(buffer: vk::CommandBuffer) {
-    let Some(d) = (unsafe { device(buffer) }) else { return };
-    with_objects(&d, |objects| {
+fn end(d: &Device, buffer: vk::CommandBuffer) {
+    if d.over() {
+        return;
+    }
+    with_objects(d, |objects| {
         let open = objects.recording(buffer).open.take();
         let layouts = match open {
             Some(Open::Pass(begun)) => begun.layouts(objects),
             Some(Open::Rendering(layouts)) => layouts,
             None => Vec::new(),
         };
-        let moves = layouts.into_iter().map(|(image, layout)| Move::Layout(image, layout));
-        objects.recording(buffer).moves.extend(moves);
+        let commands = objects.recording(buffer);
+        commands.steps.extend(layouts.into_iter().map(|(i, layout)| Step::Layout(i, layout)));
+        commands.images.clear();
+        commands.refused = "";
     });
 }
 
@@ -275,7 +344,7 @@ pub(crate) unsafe extern "system" fn begin_pass(
     contents: vk::SubpassContents,
 ) {
     let Some(d) = (unsafe { device(buffer) }) else { return };
-    unsafe { begin(buffer, info) };
+    unsafe { begin(&d, buffer, info) };
     next!(d.table.begin_pass, buffer, info, contents)
 }
 
@@ -285,7 +354,7 @@ pub(crate) unsafe extern "system" fn begin_pass2(
     contents: *const vk::SubpassBeginInfo<'_>,
 ) {
     let Some(d) = (unsafe { device(buffer) }) else { return };
-    unsafe { begin(buffer, info) };
+    unsafe { begin(&d, buffer, info) };
     next!(d.table.begin_pass2, buffer, info, contents)
 }
 
@@ -294,7 +363,7 @@ pub(crate) unsafe extern "system" fn subpass(
     contents: vk::SubpassContents,
 ) {
     let Some(d) = (unsafe { device(buffer) }) else { return };
-    next_subpass(buffer);
+    next_subpass(&d, buffer);
     next!(d.table.next_subpass, buffer, contents)
 }
 
@@ -304,13 +373,13 @@ pub(crate) unsafe extern "system" fn subpass2(
     after: *const vk::SubpassEndInfo<'_>,
 ) {
     let Some(d) = (unsafe { device(buffer) }) else { return };
-    next_subpass(buffer);
+    next_subpass(&d, buffer);
     next!(d.table.next_subpass2, buffer, contents, after)
 }
 
 pub(crate) unsafe extern "system" fn end_pass(buffer: vk::CommandBuffer) {
     let Some(d) = (unsafe { device(buffer) }) else { return };
-    end(buffer);
+    end(&d, buffer);
     next!(d.table.end_pass, buffer)
 }
 
@@ -319,13 +388,13 @@ pub(crate) unsafe extern "system" fn end_pass2(
     info: *const vk::SubpassEndInfo<'_>,
 ) {
     let Some(d) = (unsafe { device(buffer) }) else { return };
-    end(buffer);
+    end(&d, buffer);
     next!(d.table.end_pass2, buffer, info)
 }
 
 pub(crate) unsafe extern "system" fn end_rendering(buffer: vk::CommandBuffer) {
     let Some(d) = (unsafe { device(buffer) }) else { return };
-    end(buffer);
+    end(&d, buffer);
     next!(d.table.end_rendering, buffer)
 }
 
@@ -334,9 +403,11 @@ pub(crate) unsafe extern "system" fn begin_rendering(
     info: *const vk::RenderingInfo<'_>,
 ) {
     let Some(d) = (unsafe { device(buffer) }) else { return };
-    with_objects(&d, |objects| {
+    let told = |objects: &mut Objects| {
         let info = unsafe { &*info };
         let resumes = info.flags.contains(vk::RenderingFlags::RESUMING);
+        let known =
+            |view: vk::ImageView| view.is_null() || objects.views.contains_key(&view.as_raw());
         let get = |objects: &Objects, a: &vk::RenderingAttachmentInfo<'_>| {
             let load = if resumes { vk::AttachmentLoadOp::LOAD } else { a.load_op };
             attachment(objects, a.image_view.as_raw(), load, clear_value(&a.clear_value))
@@ -344,6 +415,12 @@ pub(crate) unsafe extern "system" fn begin_rendering(
         let colours = unsafe { slice(info.p_color_attachments, info.color_attachment_count) };
         let ours = colours.get(SETTINGS.location as usize);
         let depth = unsafe { info.p_depth_attachment.as_ref() };
+        let mut views = colours.iter().chain(depth).map(|a| a.image_view);
+        let refused = match () {
+            () if !views.all(known) => UNKNOWN,
+            () if unsafe { rated(info.p_next) } => RATED,
+            () => "",
+        };
         let used = colours.iter().filter(|a| !a.image_view.is_null()).count() as u32;
         let colour = ours.and_then(|a| get(objects, a));
         let resolve = ours.filter(|a| !a.resolve_mode.is_empty()).and_then(|a| {
@@ -355,10 +432,9 @@ pub(crate) unsafe extern "system" fn begin_rendering(
             let all =
                 [(a.image_view, a.image_layout), (a.resolve_image_view, a.resolve_image_layout)];
             for (view, layout) in all {
-                layouts.extend(objects.views.get(&view.as_raw()).map(|v| (v.image, layout)));
+                layouts.extend(first(objects, view.as_raw()).map(|image| (image, layout)));
             }
         }
-        let label = objects.recording(buffer).label();
         let pass = log::Pass {
             others: used - u32::from(colour.is_some()).min(used),
             colour,
@@ -366,11 +442,24 @@ pub(crate) unsafe extern "system" fn begin_rendering(
             depth: depth.and_then(|a| get(objects, a)),
             area: area(&info.render_area),
             layers: info.layer_count.max(info.view_mask.count_ones()).max(1),
-            label,
+            label: objects.label(buffer),
         };
         let commands = objects.recording(buffer);
         commands.open = Some(Open::Rendering(layouts));
-        commands.steps.push(Step::Event(log::Event::Pass(pass)));
-    });
+        enter(commands, Some(pass), refused);
+    };
+    if !d.over() {
+        with_objects(&d, told);
+    }
     next!(d.table.begin_rendering, buffer, info)
+}
+
+/// Which output goes to which attachment is no longer the pipeline's to say.
+pub(crate) unsafe extern "system" fn set_locations(
+    buffer: vk::CommandBuffer,
+    info: *const vk::RenderingAttachmentLocationInfoKHR<'_>,
+) {
+    let Some(d) = (unsafe { device(buffer) }) else { return };
+    with(&d, buffer, |commands| commands.refused = "its outputs go to other attachments");
+    next!(d.table.set_locations, buffer, info)
 }

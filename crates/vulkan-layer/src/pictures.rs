@@ -1,12 +1,12 @@
 //! Pixels of the program's images, copied between its submissions.
 
-use ash::vk::{self, Handle};
+use ash::vk;
 
 use crate::device::Device;
 use crate::memory::Buffer;
 use crate::objects::Image;
+use crate::queues::{Queue, Waited, run};
 use crate::recorder::Recorder;
-use crate::submit;
 use crate::table::next;
 
 /// Bytes of a pixel of a format that colours are drawn to, uncompressed.
@@ -39,6 +39,7 @@ fn possible(image: &Image) -> Result<u64, &'static str> {
     match image {
         Image { samples: 2.., .. } => Err("it has several samples a pixel"),
         Image { readable: false, .. } => Err("the driver does not let it be copied"),
+        Image { swapchain: true, acquired: false, .. } => Err("it is being shown"),
         Image { layout: vk::ImageLayout::UNDEFINED, .. } => Err("nothing was drawn to it"),
         _ => Ok(bytes),
     }
@@ -49,7 +50,7 @@ fn possible(image: &Image) -> Result<u64, &'static str> {
 pub(crate) fn picture(
     d: &Device,
     recorder: &mut Recorder,
-    queue: vk::Queue,
+    queue: &Queue,
     image: &Image,
     submission: u64,
     after: bool,
@@ -58,103 +59,48 @@ pub(crate) fn picture(
     let size = u64::from(image.extent.width) * u64::from(image.extent.height) * pixel;
     let usage = vk::BufferUsageFlags::TRANSFER_DST;
     let Ok(buffer) = Buffer::new(d.handle, &d.table, &d.memory, size, usage) else { return };
-    match copy(d, recorder, queue, image, buffer.handle) {
-        Ok(()) => {
+    let copied = run(d, queue, |commands| copy(d, image, buffer.handle, commands));
+    match copied {
+        Ok(Waited::Done) => {
             let pixels = unsafe { std::slice::from_raw_parts(buffer.bytes, size as usize) };
             recorder.image(image.log());
             recorder.picture(image.number, submission, after, pixels);
         }
+        // It may still be written to.
+        Ok(Waited::NotYet) => return d.park(buffer),
+        Ok(Waited::Failed) => recorder.note("an image cannot be read"),
         Err(result) => recorder.note(&format!("an image cannot be read: {result}")),
     }
     buffer.destroy(d.handle, &d.table);
 }
 
-fn copy(
-    d: &Device,
-    recorder: &mut Recorder,
-    queue: vk::Queue,
-    image: &Image,
-    to: vk::Buffer,
-) -> Result<(), vk::Result> {
-    let null = std::ptr::null();
-    let family = d.objects().queues.get(&queue.as_raw()).copied().unwrap_or(0);
-    let pool = match recorder.pools.get(&family) {
-        Some(pool) => *pool,
-        None => {
-            let info = vk::CommandPoolCreateInfo::default().queue_family_index(family);
-            let mut pool = vk::CommandPool::null();
-            let result: vk::Result =
-                next!(d.table.create_command_pool, d.handle, &info, null, &mut pool);
-            result.result()?;
-            recorder.pools.insert(family, pool);
-            pool
-        }
-    };
-    let info = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(1);
-    let mut buffer = vk::CommandBuffer::null();
-    let result: vk::Result = next!(d.table.allocate_command_buffers, d.handle, &info, &mut buffer);
-    result.result()?;
-    if let Some(set) = d.set_loader_data {
-        let result = unsafe { set(d.handle, buffer.as_raw() as *mut _) };
-        result.result()?;
-    }
-    let result = fill(d, queue, image, to, buffer);
-    let () = next!(d.table.free_command_buffers, d.handle, pool, 1, &buffer);
-    result
-}
-
-fn fill(
-    d: &Device,
-    queue: vk::Queue,
-    image: &Image,
-    to: vk::Buffer,
-    buffer: vk::CommandBuffer,
-) -> Result<(), vk::Result> {
-    let result: vk::Result = next!(d.table.begin, buffer, &vk::CommandBufferBeginInfo::default());
-    result.result()?;
+fn copy(d: &Device, image: &Image, to: vk::Buffer, buffer: vk::CommandBuffer) {
+    use vk::{AccessFlags as Access, ImageLayout};
     let aspect = vk::ImageAspectFlags::COLOR;
-    let between = |from, to| {
+    let between = |from: (ImageLayout, Access), to: (ImageLayout, Access)| {
         let range =
             vk::ImageSubresourceRange::default().aspect_mask(aspect).level_count(1).layer_count(1);
-        let all = vk::AccessFlags::MEMORY_READ | vk::AccessFlags::MEMORY_WRITE;
-        let barrier = vk::ImageMemoryBarrier::default()
-            .src_access_mask(all)
-            .dst_access_mask(all)
-            .old_layout(from)
-            .new_layout(to)
+        let barrier = [vk::ImageMemoryBarrier::default()
+            .old_layout(from.0)
+            .src_access_mask(from.1)
+            .new_layout(to.0)
+            .dst_access_mask(to.1)
             .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
             .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
             .image(image.handle)
-            .subresource_range(range);
+            .subresource_range(range)];
         let stages = vk::PipelineStageFlags::ALL_COMMANDS;
-        let (none, null) = (vk::DependencyFlags::empty(), std::ptr::null());
-        let () = next!(
-            d.table.barrier,
-            buffer,
-            stages,
-            stages,
-            none,
-            0,
-            null,
-            0,
-            std::ptr::null(),
-            1,
-            &barrier
-        );
+        let (none, null, no) = (vk::DependencyFlags::empty(), std::ptr::null(), std::ptr::null());
+        let barriers = barrier.as_ptr();
+        let () = next!(d.table.barrier, buffer, stages, stages, none, 0, null, 0, no, 1, barriers);
     };
-    let reading = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
-    between(image.layout, reading);
+    let all = Access::MEMORY_READ | Access::MEMORY_WRITE;
+    let reading = (ImageLayout::TRANSFER_SRC_OPTIMAL, Access::TRANSFER_READ);
+    between((image.layout, all), reading);
     let layers = vk::ImageSubresourceLayers::default().aspect_mask(aspect).layer_count(1);
     let region = vk::BufferImageCopy::default()
         .image_subresource(layers)
         .image_extent(vk::Extent3D { depth: 1, ..image.extent });
-    let () = next!(d.table.copy_to_buffer, buffer, image.handle, reading, to, 1, &region);
-    between(reading, image.layout);
-    let result: vk::Result = next!(d.table.end, buffer);
-    result.result()?;
-    let buffers = [buffer];
-    let info = vk::SubmitInfo::default().command_buffers(&buffers);
-    let result: vk::Result = next!(d.table.submit, queue, 1, &info, vk::Fence::null());
-    result.result()?;
-    if submit::drain(d, queue, submit::PATIENCE) { Ok(()) } else { Err(vk::Result::TIMEOUT) }
+    let () = next!(d.table.copy_to_buffer, buffer, image.handle, reading.0, to, 1, &region);
+    between(reading, (image.layout, all));
 }

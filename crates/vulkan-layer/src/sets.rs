@@ -13,7 +13,8 @@ use crate::layouts::PipelineLayout;
 /// A set as the program bound it.
 #[derive(Clone)]
 struct Bound {
-    set: vk::DescriptorSet,
+    /// None where it was pushed: then it cannot be bound again, and is never to be disturbed.
+    set: Option<vk::DescriptorSet>,
     layout: PipelineLayout,
     offsets: Vec<u32>,
     disturbed: bool,
@@ -37,12 +38,13 @@ impl Sets {
         sets: &[vk::DescriptorSet],
         mut offsets: &[u32],
     ) {
+        self.forget_pushed(layout);
         for (set, at) in sets.iter().zip(first as usize..) {
             let dynamic = layout.sets.get(at).map_or(0, |s| s.dynamic as usize);
             let (own, rest) = offsets.split_at(dynamic.min(offsets.len()));
             offsets = rest;
             let bound = Bound {
-                set: *set,
+                set: Some(*set),
                 layout: layout.clone(),
                 offsets: own.to_vec(),
                 disturbed: false,
@@ -51,9 +53,31 @@ impl Sets {
         }
     }
 
-    /// The program pushes descriptors, which cannot be bound again.
-    pub(crate) fn push(&mut self, set: u32) {
-        self.put(set as usize, None);
+    /// The program pushes descriptors.
+    pub(crate) fn push(&mut self, layout: &PipelineLayout, set: u32) {
+        self.forget_pushed(layout);
+        let (layout, offsets) = (layout.clone(), Vec::new());
+        self.put(set as usize, Some(Bound { set: None, layout, offsets, disturbed: false }));
+    }
+
+    /// The program binds sets with a layout that is not known.
+    pub(crate) fn lose(&mut self, first: u32, n: u32) {
+        (first..first + n).for_each(|at| self.put(at as usize, None));
+    }
+
+    /// What the program itself disturbs, binding with `layout`, is not ours to keep.
+    fn forget_pushed(&mut self, layout: &PipelineLayout) {
+        for (at, bound) in self.bound.iter_mut().enumerate() {
+            let lost = |b: &mut Bound| b.set.is_none() && !b.layout.compatible(layout, at);
+            bound.take_if(lost);
+        }
+    }
+
+    /// Whether our set, bound with `layout`, would disturb a pushed one.
+    pub(crate) fn would_lose(&self, layout: &PipelineLayout) -> bool {
+        self.bound.iter().enumerate().any(|(at, bound)| {
+            bound.as_ref().is_some_and(|b| b.set.is_none() && !b.layout.compatible(layout, at))
+        })
     }
 
     fn put(&mut self, at: usize, bound: Option<Bound>) {
@@ -68,10 +92,11 @@ impl Sets {
         let mut again = Vec::new();
         for (at, bound) in self.bound.iter_mut().enumerate() {
             let Some(bound) = bound.as_mut().filter(|bound| bound.disturbed) else { continue };
+            let Some(set) = bound.set else { continue };
             let own = bound.layout.sets.get(at).map(|s| s.identity);
             // Else the draw cannot use it, and it stays disturbed.
             if own.is_some() && own == layout.sets.get(at).map(|s| s.identity) {
-                again.push((at as u32, bound.set, bound.offsets.clone()));
+                again.push((at as u32, set, bound.offsets.clone()));
                 bound.layout = layout.clone();
                 bound.disturbed = false;
             }
@@ -96,11 +121,9 @@ mod tests {
     use ash::vk::Handle;
 
     use super::*;
-    use crate::layouts::SetLayout;
 
     fn layout(sets: &[u64]) -> PipelineLayout {
-        let sets = sets.iter().map(|&identity| SetLayout { identity, dynamic: 1 }).collect();
-        PipelineLayout { sets, ours: true, ..PipelineLayout::default() }
+        PipelineLayout::of(sets, 0)
     }
 
     fn set(n: u64) -> vk::DescriptorSet {
@@ -125,14 +148,25 @@ mod tests {
     #[test]
     fn other_push_constants_disturb_all() {
         let a = layout(&[1, 2]);
-        let b = PipelineLayout { push: 7, ..a.clone() };
+        let b = PipelineLayout::of(&[1, 2], 7);
         let mut sets = Sets::default();
         sets.bind(&a, 0, &[set(10), set(20)], &[100, 200]);
         sets.disturb(&b);
         assert_eq!(sets.again(&a).len(), 2);
-        sets.bind(&a, 1, &[set(30)], &[300]);
-        sets.push(0);
-        sets.disturb(&b);
-        assert_eq!(sets.again(&b), [(1, set(30), vec![300])]);
+    }
+
+    #[test]
+    fn pushed_sets_are_not_disturbed_but_by_the_program() {
+        let (a, b) = (layout(&[1, 2]), layout(&[1]));
+        let mut sets = Sets::default();
+        sets.bind(&a, 0, &[set(10)], &[100]);
+        sets.push(&a, 1);
+        assert!(!sets.would_lose(&a));
+        assert!(sets.would_lose(&b));
+        sets.bind(&b, 0, &[set(10)], &[100]);
+        assert!(!sets.would_lose(&b));
+        sets.push(&a, 1);
+        sets.lose(0, 2);
+        assert!(!sets.would_lose(&b));
     }
 }

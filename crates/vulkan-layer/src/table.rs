@@ -50,6 +50,10 @@ table! {
             = c"vkGetPhysicalDeviceProperties2" | c"vkGetPhysicalDeviceProperties2KHR",
         memory: PFN_vkGetPhysicalDeviceMemoryProperties = c"vkGetPhysicalDeviceMemoryProperties",
         features: PFN_vkGetPhysicalDeviceFeatures = c"vkGetPhysicalDeviceFeatures",
+        image_format: PFN_vkGetPhysicalDeviceImageFormatProperties
+            = c"vkGetPhysicalDeviceImageFormatProperties",
+        surface: PFN_vkGetPhysicalDeviceSurfaceCapabilitiesKHR
+            = c"vkGetPhysicalDeviceSurfaceCapabilitiesKHR",
         features2: PFN_vkGetPhysicalDeviceFeatures2
             = c"vkGetPhysicalDeviceFeatures2" | c"vkGetPhysicalDeviceFeatures2KHR",
     }
@@ -64,15 +68,23 @@ table! {
         device_wait_idle: PFN_vkDeviceWaitIdle = c"vkDeviceWaitIdle",
         submit: PFN_vkQueueSubmit = c"vkQueueSubmit",
         submit2: PFN_vkQueueSubmit2 = c"vkQueueSubmit2" | c"vkQueueSubmit2KHR",
+        bind_sparse: PFN_vkQueueBindSparse = c"vkQueueBindSparse",
         present: PFN_vkQueuePresentKHR = c"vkQueuePresentKHR",
+        queue_begin_label: PFN_vkQueueBeginDebugUtilsLabelEXT = c"vkQueueBeginDebugUtilsLabelEXT",
+        queue_end_label: PFN_vkQueueEndDebugUtilsLabelEXT = c"vkQueueEndDebugUtilsLabelEXT",
+        queue_insert_label: PFN_vkQueueInsertDebugUtilsLabelEXT
+            = c"vkQueueInsertDebugUtilsLabelEXT",
         create_fence: PFN_vkCreateFence = c"vkCreateFence",
         destroy_fence: PFN_vkDestroyFence = c"vkDestroyFence",
+        fence_status: PFN_vkGetFenceStatus = c"vkGetFenceStatus",
+        reset_fences: PFN_vkResetFences = c"vkResetFences",
         wait_fences: PFN_vkWaitForFences = c"vkWaitForFences",
         wait_semaphores: PFN_vkWaitSemaphores = c"vkWaitSemaphores" | c"vkWaitSemaphoresKHR",
         counter: PFN_vkGetSemaphoreCounterValue
             = c"vkGetSemaphoreCounterValue" | c"vkGetSemaphoreCounterValueKHR",
         create_semaphore: PFN_vkCreateSemaphore = c"vkCreateSemaphore",
         destroy_semaphore: PFN_vkDestroySemaphore = c"vkDestroySemaphore",
+        import_semaphore: PFN_vkImportSemaphoreFdKHR = c"vkImportSemaphoreFdKHR",
 
         create_buffer: PFN_vkCreateBuffer = c"vkCreateBuffer",
         destroy_buffer: PFN_vkDestroyBuffer = c"vkDestroyBuffer",
@@ -86,9 +98,14 @@ table! {
 
         create_image: PFN_vkCreateImage = c"vkCreateImage",
         destroy_image: PFN_vkDestroyImage = c"vkDestroyImage",
+        image_requirements: PFN_vkGetDeviceImageMemoryRequirements
+            = c"vkGetDeviceImageMemoryRequirements" | c"vkGetDeviceImageMemoryRequirementsKHR",
         create_image_view: PFN_vkCreateImageView = c"vkCreateImageView",
         destroy_image_view: PFN_vkDestroyImageView = c"vkDestroyImageView",
         create_swapchain: PFN_vkCreateSwapchainKHR = c"vkCreateSwapchainKHR",
+        create_swapchains: PFN_vkCreateSharedSwapchainsKHR = c"vkCreateSharedSwapchainsKHR",
+        acquire: PFN_vkAcquireNextImageKHR = c"vkAcquireNextImageKHR",
+        acquire2: PFN_vkAcquireNextImage2KHR = c"vkAcquireNextImage2KHR",
         destroy_swapchain: PFN_vkDestroySwapchainKHR = c"vkDestroySwapchainKHR",
         swapchain_images: PFN_vkGetSwapchainImagesKHR = c"vkGetSwapchainImagesKHR",
         create_render_pass: PFN_vkCreateRenderPass = c"vkCreateRenderPass",
@@ -122,9 +139,14 @@ table! {
 
         bind_pipeline: PFN_vkCmdBindPipeline = c"vkCmdBindPipeline",
         bind_sets: PFN_vkCmdBindDescriptorSets = c"vkCmdBindDescriptorSets",
-        push_set: PFN_vkCmdPushDescriptorSetKHR = c"vkCmdPushDescriptorSetKHR",
+        push_set: PFN_vkCmdPushDescriptorSetKHR
+            = c"vkCmdPushDescriptorSet" | c"vkCmdPushDescriptorSetKHR",
         push_set_template: PFN_vkCmdPushDescriptorSetWithTemplateKHR
-            = c"vkCmdPushDescriptorSetWithTemplateKHR",
+            = c"vkCmdPushDescriptorSetWithTemplate" | c"vkCmdPushDescriptorSetWithTemplateKHR",
+        create_template: PFN_vkCreateDescriptorUpdateTemplate
+            = c"vkCreateDescriptorUpdateTemplate" | c"vkCreateDescriptorUpdateTemplateKHR",
+        destroy_template: PFN_vkDestroyDescriptorUpdateTemplate
+            = c"vkDestroyDescriptorUpdateTemplate" | c"vkDestroyDescriptorUpdateTemplateKHR",
         begin_pass: PFN_vkCmdBeginRenderPass = c"vkCmdBeginRenderPass",
         begin_pass2: PFN_vkCmdBeginRenderPass2
             = c"vkCmdBeginRenderPass2" | c"vkCmdBeginRenderPass2KHR",
@@ -137,9 +159,16 @@ table! {
             = c"vkCmdBeginRendering" | c"vkCmdBeginRenderingKHR",
         end_rendering: PFN_vkCmdEndRendering
             = c"vkCmdEndRendering" | c"vkCmdEndRenderingKHR",
+        set_locations: PFN_vkCmdSetRenderingAttachmentLocationsKHR
+            = c"vkCmdSetRenderingAttachmentLocations"
+            | c"vkCmdSetRenderingAttachmentLocationsKHR",
+        begin_condition: PFN_vkCmdBeginConditionalRenderingEXT
+            = c"vkCmdBeginConditionalRenderingEXT",
+        end_condition: PFN_vkCmdEndConditionalRenderingEXT = c"vkCmdEndConditionalRenderingEXT",
         execute: PFN_vkCmdExecuteCommands = c"vkCmdExecuteCommands",
         clear_attachments: PFN_vkCmdClearAttachments = c"vkCmdClearAttachments",
         clear_colour_image: PFN_vkCmdClearColorImage = c"vkCmdClearColorImage",
+        clear_depth_image: PFN_vkCmdClearDepthStencilImage = c"vkCmdClearDepthStencilImage",
         copy_image: PFN_vkCmdCopyImage = c"vkCmdCopyImage",
         copy_image2: PFN_vkCmdCopyImage2 = c"vkCmdCopyImage2" | c"vkCmdCopyImage2KHR",
         blit_image: PFN_vkCmdBlitImage = c"vkCmdBlitImage",
@@ -185,6 +214,8 @@ table! {
             = c"vkCmdSetDepthWriteEnable" | c"vkCmdSetDepthWriteEnableEXT",
         set_depth_op: PFN_vkCmdSetDepthCompareOp
             = c"vkCmdSetDepthCompareOp" | c"vkCmdSetDepthCompareOpEXT",
+        set_bounds: PFN_vkCmdSetDepthBoundsTestEnable
+            = c"vkCmdSetDepthBoundsTestEnable" | c"vkCmdSetDepthBoundsTestEnableEXT",
         set_stencil_test: PFN_vkCmdSetStencilTestEnable
             = c"vkCmdSetStencilTestEnable" | c"vkCmdSetStencilTestEnableEXT",
         set_stencil_op: PFN_vkCmdSetStencilOp

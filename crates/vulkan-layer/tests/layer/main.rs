@@ -13,7 +13,7 @@ use screendoor_vulkan_layer::log::{Draw, Event};
 use screendoor_vulkan_layer::settings::{Settings, Span};
 
 /// Cases of which draws are refused, and why.
-const REFUSED: [(&str, &str); 11] = [
+const REFUSED: [(&str, &str); 14] = [
     ("integer-target", "its output is an integer"),
     ("sets-unasked", "its layout uses all"),
     ("geometry", "it has a geometry shader"),
@@ -25,6 +25,9 @@ const REFUSED: [(&str, &str); 11] = [
     ("indirect-count-core", "the number of its draws lies in a buffer"),
     ("draw-id", "gl_DrawID"),
     ("multi-draw", "several instances"),
+    ("push-above", "pushed descriptors"),
+    ("timeline-twice", "its command buffer is run twice"),
+    ("very-many-draws", "more draws are recorded at a time"),
 ];
 
 /// Cases that have a test of their own, since they do not come to an end by themselves.
@@ -212,4 +215,50 @@ fn clears_and_writes_between_draws_are_told() {
     };
     assert!(count("clear-attachments", |e| matches!(e, Event::Clear(c) if !c.depth)) >= 1);
     assert_eq!(count("plain", |e| matches!(e, Event::Clear(_) | Event::Write(_))), 0);
+    // Between the draws before and after, and of the image that they are drawn to.
+    let captures = captured("overwritten", &Settings::default()).1;
+    let events: Vec<&Event> = captures[0].events().collect();
+    let at = events.iter().position(|e| matches!(e, Event::Write(_))).expect("a write");
+    let Event::Write(write) = events[at] else { unreachable!() };
+    assert_eq!(write.command, "vkCmdCopyImage");
+    let drawn = |events: &[&Event]| {
+        events.iter().any(|e| {
+            matches!(e, Event::Pass(p)
+            if p.colour.as_ref().is_some_and(|c| c.image == write.image))
+        }) && events.iter().any(|e| matches!(e, Event::Draw(_)))
+    };
+    assert!(drawn(&events[..at]) && drawn(&events[at..]));
+}
+
+#[test]
+fn nobody_waits_long_for_what_comes_later() {
+    if skipped() {
+        return;
+    }
+    for case in ["timeline-behind", "timeline-twice", "timeline-two-queues", "events"] {
+        let plain = raw(case, None);
+        let ran = captured(case, &Settings::default()).0;
+        let more = ran.took.saturating_sub(plain.took);
+        assert!(more.as_millis() < 1000, "{case} takes {more:?} longer");
+    }
+}
+
+#[test]
+fn pipelines_that_draw_nothing_leave_no_draws() {
+    if skipped() {
+        return;
+    }
+    let captures = captured("discarded", &Settings::default()).1;
+    assert_eq!(captures[0].draws().count(), 4);
+    assert!(captures[0].draws().all(|d| d.refused.is_empty()));
+}
+
+#[test]
+fn what_is_recorded_long_before_is_the_programs_own() {
+    if skipped() {
+        return;
+    }
+    let settings = Settings { span: Span::Frames(1000, 1001), ..Settings::default() };
+    check_nothing("cost", &settings);
+    check_nothing("secondaries", &settings);
 }

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
 
 use screendoor_vulkan_layer::log::{
     Draw, Entry, Event, Files, Image, Picture, Pipeline, RECORD_BYTES, Record, Submission, entries,
@@ -26,6 +27,7 @@ pub(crate) struct Ran {
     pub picture: Vec<u8>,
     /// What it and the layer said.
     pub text: String,
+    pub took: Duration,
 }
 
 /// Runs a case, under the layer where there are settings.
@@ -47,12 +49,15 @@ pub(crate) fn raw(case: &str, settings: Option<&Settings>) -> Ran {
         command.env("VK_ADD_LAYER_PATH", &folder).env("VK_INSTANCE_LAYERS", LAYER);
         command.envs(settings.variables());
     }
+    let start = Instant::now();
     let output = command.output().unwrap();
+    let took = start.elapsed();
     let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
     let ran = Ran {
         code: output.status.code(),
         picture: std::fs::read(&out).unwrap_or_default(),
         text: text.into_owned(),
+        took,
     };
     std::fs::remove_dir_all(&folder).unwrap();
     ran

@@ -18,7 +18,7 @@ use crate::target::{Target, TargetPlan};
 const STRIDE: u32 = 256;
 
 /// Parts of a tint that differ.
-const PARTS: [[f32; 4]; 4] =
+pub(super) const PARTS: [[f32; 4]; 4] =
     [[0.7, 0.2, 0.5, 0.5], [0.2, 0.7, 0.4, 0.5], [0.1, 0.5, 0.9, 0.4], [0.9, 0.1, 0.2, 0.6]];
 
 /// Parts for `count` sets. The first `read` make the same tint together, however many they are, so
@@ -33,9 +33,9 @@ fn parts(read: u32, count: u32) -> Vec<[f32; 4]> {
 }
 
 /// A descriptor set for each of some tints.
-struct Tints {
-    layouts: Vec<vk::DescriptorSetLayout>,
-    sets: Vec<vk::DescriptorSet>,
+pub(super) struct Tints {
+    pub(super) layouts: Vec<vk::DescriptorSetLayout>,
+    pub(super) sets: Vec<vk::DescriptorSet>,
     buffer: Buffer,
 }
 
@@ -45,7 +45,7 @@ fn tint(buffer: &Buffer, k: u32) -> vk::DescriptorBufferInfo {
     vk::DescriptorBufferInfo { buffer, offset, range: 16 }
 }
 
-fn tints(gpu: &Gpu, tints: &[[f32; 4]], kind: Kind) -> Result<Tints> {
+pub(super) fn tints(gpu: &Gpu, tints: &[[f32; 4]], kind: Kind) -> Result<Tints> {
     let values = tints.iter().flat_map(|tint| {
         let mut words = [0; STRIDE as usize / 4];
         words[..4].copy_from_slice(&tint.map(f32::to_bits));
@@ -91,10 +91,19 @@ fn set_layout(
     kind: Kind,
     flags: vk::DescriptorSetLayoutCreateFlags,
 ) -> Result<vk::DescriptorSetLayout> {
+    set_layout_of(gpu, kind, flags, vk::ShaderStageFlags::FRAGMENT)
+}
+
+fn set_layout_of(
+    gpu: &Gpu,
+    kind: Kind,
+    flags: vk::DescriptorSetLayoutCreateFlags,
+    stages: vk::ShaderStageFlags,
+) -> Result<vk::DescriptorSetLayout> {
     let binding = [vk::DescriptorSetLayoutBinding::default()
         .descriptor_type(kind)
         .descriptor_count(1)
-        .stage_flags(vk::ShaderStageFlags::FRAGMENT)];
+        .stage_flags(stages)];
     let info = vk::DescriptorSetLayoutCreateInfo::default().flags(flags).bindings(&binding);
     // SAFETY: what the structure points at lives until the end of the block.
     unsafe {
@@ -104,7 +113,7 @@ fn set_layout(
     }
 }
 
-fn bind(
+pub(super) fn bind(
     recorder: &Recorder<'_>,
     layout: vk::PipelineLayout,
     first: u32,
@@ -194,6 +203,84 @@ fn kept(kind: Kind, below: bool) -> Result<Vec<u8>> {
         recorder.shapes(one, &all[2..4]);
         recorder.bind(first);
         recorder.shapes(both, &all[4..]);
+    })
+}
+
+/// Descriptors are pushed for computing while others are bound for drawing.
+pub(super) fn push_compute() -> Result<Vec<u8>> {
+    pushed(true)
+}
+
+/// A pushed set stays over a pipeline without it.
+pub(super) fn push_above() -> Result<Vec<u8>> {
+    pushed(false)
+}
+
+/// As [`kept`]; the second set is pushed, or another is for computing.
+fn pushed(compute: bool) -> Result<Vec<u8>> {
+    let gpu = Gpu::with(|opening| opening.extension(ash::khr::push_descriptor::NAME))?;
+    let calls = ash::khr::push_descriptor::Device::new(&gpu.host.instance, &gpu.device);
+    let target = Target::new(&gpu, TargetPlan::default())?;
+    let kind = if compute { Kind::UNIFORM_BUFFER_DYNAMIC } else { Kind::UNIFORM_BUFFER };
+    let tints = tints(&gpu, &PARTS, kind)?;
+    let flag = vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR;
+    let stages =
+        if compute { vk::ShaderStageFlags::COMPUTE } else { vk::ShaderStageFlags::FRAGMENT };
+    let push = set_layout_of(&gpu, Kind::UNIFORM_BUFFER, flag, stages)?;
+    let with_push = layout(&gpu, &[tints.layouts[0], push], SHAPE)?;
+    let both = if compute { layout(&gpu, &tints.layouts[..2], SHAPE)? } else { with_push };
+    let one = layout(&gpu, &tints.layouts[..1], SHAPE)?;
+    let plan = Plan::new(&gpu, &target)?;
+    let first = Plan { layout: both, ..plan.clone() }.fragment(shader::TWO_SETS).create(&gpu)?;
+    let other = Plan { layout: one, ..plan.clone() }.fragment(shader::ONE_SET).create(&gpu)?;
+    let at = [tint(&tints.buffer, 1)];
+    let write =
+        [vk::WriteDescriptorSet::default().descriptor_type(Kind::UNIFORM_BUFFER).buffer_info(&at)];
+    one_pass(&gpu, &target, |recorder| {
+        let all = shapes();
+        recorder.bind(first);
+        let point = if compute {
+            bind(recorder, both, 0, &tints.sets[..2], &[STRIDE, 3 * STRIDE]);
+            vk::PipelineBindPoint::COMPUTE
+        } else {
+            bind(recorder, both, 0, &tints.sets[..1], &[]);
+            vk::PipelineBindPoint::GRAPHICS
+        };
+        // SAFETY: the layout's second set is for this.
+        unsafe { calls.cmd_push_descriptor_set(recorder.buffer, point, with_push, 1, &write) }
+        recorder.shapes(both, &all[..2]);
+        recorder.bind(other);
+        recorder.shapes(one, &all[2..4]);
+        recorder.bind(first);
+        recorder.shapes(both, &all[4..]);
+    })
+}
+
+/// As many descriptors with dynamic offsets as there are, and samplers that nobody looks at.
+pub(super) fn most_dynamic() -> Result<Vec<u8>> {
+    let gpu = Gpu::plain()?;
+    let binding = vk::DescriptorSetLayoutBinding {
+        descriptor_type: Kind::UNIFORM_BUFFER_DYNAMIC,
+        descriptor_count: gpu.host.limits.max_descriptor_set_uniform_buffers_dynamic,
+        stage_flags: vk::ShaderStageFlags::VERTEX,
+        // Of descriptors that are no samplers it is ignored.
+        p_immutable_samplers: std::ptr::dangling(),
+        ..vk::DescriptorSetLayoutBinding::default()
+    };
+    let bindings = [binding];
+    let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
+    // SAFETY: what the structure points at lives until the end of the block.
+    let sets = unsafe {
+        let layout = gpu.device.create_descriptor_set_layout(&info, None)?;
+        gpu.at_end(move |d| d.destroy_descriptor_set_layout(layout, None));
+        [layout]
+    };
+    let target = Target::new(&gpu, TargetPlan::default())?;
+    let plan = Plan { layout: layout(&gpu, &sets, SHAPE)?, ..Plan::new(&gpu, &target)? };
+    let pipeline = plan.create(&gpu)?;
+    one_pass(&gpu, &target, |recorder| {
+        recorder.bind(pipeline);
+        recorder.shapes(plan.layout, &shapes());
     })
 }
 

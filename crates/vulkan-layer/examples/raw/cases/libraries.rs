@@ -3,12 +3,14 @@
 use ash::vk;
 use vk::GraphicsPipelineLibraryFlagsEXT as Part;
 
+use super::descriptors::{PARTS, bind, tints};
 use super::one_pass;
-use crate::failure::Result;
+use crate::failure::{Failure, Result};
 use crate::gpu::Gpu;
 use crate::host::Opening;
-use crate::pipeline::{Plan, pipeline};
+use crate::pipeline::{Plan, SHAPE, STAGES, pipeline};
 use crate::scene::shapes;
+use crate::shader;
 use crate::target::{Target, TargetPlan};
 
 fn ask(opening: &mut Opening) -> Result<()> {
@@ -24,22 +26,53 @@ pub(super) fn libraries() -> Result<Vec<u8>> {
     let gpu = Gpu::with(ask)?;
     let target = Target::new(&gpu, TargetPlan::default())?;
     let plan = Plan::new(&gpu, &target)?;
-    let pipeline = linked(&gpu, &plan)?;
+    let pipeline = linked(&gpu, &plan, [plan.layout; 2])?;
     one_pass(&gpu, &target, |recorder| {
         recorder.bind(pipeline);
         recorder.shapes(plan.layout, &shapes());
     })
 }
 
-/// The plan's pipeline, linked of its four parts.
-fn linked(gpu: &Gpu, plan: &Plan) -> Result<vk::Pipeline> {
+/// The parts of vertices and of fragments each have a layout with the sets that they need.
+pub(super) fn libraries_apart() -> Result<Vec<u8>> {
+    let gpu = Gpu::with(ask)?;
+    let target = Target::new(&gpu, TargetPlan::default())?;
+    let tints = tints(&gpu, &PARTS, vk::DescriptorType::UNIFORM_BUFFER)?;
+    let layout = |n: usize| {
+        let ranges = [vk::PushConstantRange { stage_flags: STAGES, offset: 0, size: SHAPE }];
+        let info = vk::PipelineLayoutCreateInfo::default()
+            .flags(vk::PipelineLayoutCreateFlags::INDEPENDENT_SETS_EXT)
+            .set_layouts(&tints.layouts[..n])
+            .push_constant_ranges(&ranges);
+        // SAFETY: what the structure points at lives until the end of the block.
+        unsafe {
+            let layout = gpu.device.create_pipeline_layout(&info, None)?;
+            gpu.at_end(move |d| d.destroy_pipeline_layout(layout, None));
+            Ok(layout)
+        }
+    };
+    let layouts: Result<Vec<_>> = [2, 1, 2].into_iter().map(layout).collect();
+    let [whole, vertices, fragments] = layouts?[..] else {
+        return Err(Failure::unsupported("three layouts"));
+    };
+    let plan = Plan { layout: whole, ..Plan::new(&gpu, &target)? }.fragment(shader::TWO_SETS);
+    let pipeline = linked(&gpu, &plan, [vertices, fragments])?;
+    one_pass(&gpu, &target, |recorder| {
+        recorder.bind(pipeline);
+        bind(recorder, whole, 0, &tints.sets[..2], &[]);
+        recorder.shapes(whole, &shapes());
+    })
+}
+
+/// The plan's pipeline, linked of its four parts, with the layouts of vertices and of fragments.
+fn linked(gpu: &Gpu, plan: &Plan, layouts: [vk::PipelineLayout; 2]) -> Result<vk::Pipeline> {
     let parts = plan.describe(gpu, |whole| {
         let empty = vk::GraphicsPipelineCreateInfo::default();
         let stages = |at: usize| vk::GraphicsPipelineCreateInfo {
             stage_count: 1,
             // SAFETY: the plan has two stages.
             p_stages: unsafe { whole.p_stages.add(at) },
-            layout: whole.layout,
+            layout: layouts[at],
             ..empty
         };
         let input = vk::GraphicsPipelineCreateInfo {

@@ -11,6 +11,7 @@ mod indirect;
 mod labels;
 mod libraries;
 mod passes;
+mod pipelines;
 mod process;
 mod rendering;
 mod stages;
@@ -85,6 +86,12 @@ pub(crate) const CASES: &[Case] = &[
     case("again", "a primary in two submissions", Picture(commands::again)),
     case("recorded-again", "a primary thrown away and recorded again", Picture(commands::recorded_again)),
     case("libraries", "a pipeline linked of four libraries", Picture(libraries::libraries)),
+    case("libraries-apart", "a pipeline linked of parts with layouts of their own", Picture(libraries::libraries_apart)),
+    case("discarded", "one pipeline draws nothing, its state is ignored", Picture(pipelines::discarded)),
+    case("allocator", "a layout of the program's memory goes before its pipeline", Picture(pipelines::allocator)),
+    case("nothing-submitted", "a submission without command buffers first", Picture(pipelines::nothing_submitted)),
+    case("very-many-draws", "131,082 draws", Picture(pipelines::very_many_draws)),
+    case("cost", "what a draw costs to record, the least of NUMBER (20) times", Program(pipelines::cost)),
     case("module-in-pnext", "shaders with no modules", Picture(libraries::module_in_pnext)),
     case("sets", "as many descriptor sets as there are, up to 8, all read", Picture(descriptors::sets)),
     case("all-sets", "as many descriptor sets as there are, two read", Picture(descriptors::all_sets)),
@@ -93,6 +100,9 @@ pub(crate) const CASES: &[Case] = &[
     case("set-above-dynamic", "the same with dynamic offsets", Picture(descriptors::set_above_dynamic)),
     case("set-below", "the same while another first set is bound", Picture(descriptors::set_below)),
     case("push-descriptors", "a set written by commands", Picture(descriptors::push_descriptors)),
+    case("push-compute", "descriptors pushed for computing in between", Picture(descriptors::push_compute)),
+    case("push-above", "a pushed set stays over a pipeline without it", Picture(descriptors::push_above)),
+    case("most-dynamic", "all descriptors with dynamic offsets that there are", Picture(descriptors::most_dynamic)),
     case("indexed", "vertex, instance and index buffers", Picture(indirect::indexed)),
     case("indexed-indirect", "the same, each draw's numbers in a buffer", Picture(indirect::indexed_indirect)),
     case("indirect", "each draw's numbers in a buffer", Picture(indirect::indirect)),
@@ -116,6 +126,7 @@ pub(crate) const CASES: &[Case] = &[
     case("clear-attachments", "all is cleared between draws", Picture(passes::clear_attachments)),
     case("clear-part", "a part is cleared between draws", Picture(passes::clear_part)),
     case("blit", "OUT is a copy of the target, upside down", Picture(passes::blit)),
+    case("overwritten", "the target is copied onto itself between draws", Picture(passes::overwritten)),
     case("resolve-command", "4 samples, resolved after the pass", Picture(passes::resolve_command)),
     case("geometry", "a geometry shader", Picture(stages::geometry)),
     case("tessellation", "tessellation shaders", Picture(stages::tessellation)),
@@ -129,6 +140,8 @@ pub(crate) const CASES: &[Case] = &[
     case("timeline", "submissions wait for the host", Picture(sync::timeline)),
     case("timeline-queue", "a submission waits for one before it", Picture(sync::timeline_queue)),
     case("timeline-two-queues", "a submission waits for a later one of another queue", Picture(sync::timeline_two_queues)),
+    case("timeline-twice", "commands twice, each time waiting for the host", Picture(sync::timeline_twice)),
+    case("timeline-behind", "a submission behind one that waits for the host", Picture(sync::timeline_behind)),
     case("events", "commands wait for an event that the host sets", Picture(sync::events)),
     case("fork", "a child process draws", Program(process::child)),
     case("forked", "a copy of the process draws", Program(process::forked)),

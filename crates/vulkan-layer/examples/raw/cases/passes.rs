@@ -10,7 +10,7 @@ use crate::pass::Subpass;
 use crate::pipeline::Plan;
 use crate::record::{Recorder, read};
 use crate::scene::shapes;
-use crate::target::{EXTENT, Target, TargetPlan};
+use crate::target::{EXTENT, Images, Target, TargetPlan};
 
 pub(super) fn load() -> Result<Vec<u8>> {
     let gpu = Gpu::plain()?;
@@ -142,6 +142,47 @@ pub(super) fn blit() -> Result<Vec<u8>> {
         // SAFETY: the images are as large as the region.
         unsafe { gpu.device.cmd_blit_image(at, from, reads, to, writes, &[region], filter) }
     })
+}
+
+/// The target is overwritten by copies of its own upper half, and drawn onto again.
+pub(super) fn overwritten() -> Result<Vec<u8>> {
+    let gpu = Gpu::plain()?;
+    let plan = TargetPlan::default();
+    let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT
+        | vk::ImageUsageFlags::TRANSFER_SRC
+        | vk::ImageUsageFlags::TRANSFER_DST;
+    let (extent, samples) = (plan.extent, plan.samples);
+    let image = ImagePlan { format: plan.colours[0], extent, layers: 1, samples, usage };
+    let colours = vec![Image::new(&gpu, image)?];
+    let target = Target::of(&gpu, plan, Images { colours, resolves: Vec::new(), depth: None })?;
+    let loading = target.plan.pass(&gpu, true)?;
+    let plan = Plan::new(&gpu, &target)?;
+    let pipeline = plan.create(&gpu)?;
+    let picture = &target.images.colours[0];
+    let layers = vk::ImageSubresourceLayers::default()
+        .aspect_mask(vk::ImageAspectFlags::COLOR)
+        .layer_count(1);
+    let half = EXTENT.height / 2;
+    let region = vk::ImageCopy::default()
+        .src_subresource(layers)
+        .dst_subresource(layers)
+        .dst_offset(vk::Offset3D { x: 0, y: half.cast_signed(), z: 0 })
+        .extent(vk::Extent3D { width: EXTENT.width, height: half, depth: 1 });
+    let recorder = recorded(&gpu, &target, target.pass, &plan, &shapes()[..4])?;
+    let (reads, both) = (vk::ImageLayout::TRANSFER_SRC_OPTIMAL, vk::ImageLayout::GENERAL);
+    recorder.relayout(picture, reads, both);
+    // SAFETY: the halves do not overlap.
+    unsafe {
+        let (at, image) = (recorder.buffer, picture.handle);
+        gpu.device.cmd_copy_image(at, image, both, image, both, &[region]);
+    }
+    recorder.relayout(picture, both, reads);
+    recorder.pass_of(&target, loading, vk::SubpassContents::INLINE);
+    recorder.bind(pipeline);
+    recorder.shapes(plan.layout, &shapes()[4..]);
+    recorder.end_pass();
+    recorder.run()?;
+    read(&gpu, target.images.finished())
 }
 
 /// Four samples, resolved by a command after the pass.

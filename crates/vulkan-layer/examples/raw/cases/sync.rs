@@ -10,7 +10,10 @@ use super::halves;
 use crate::failure::Result;
 use crate::gpu::Gpu;
 use crate::host::Opening;
+use crate::pipeline::Plan;
 use crate::record::{Recorder, read};
+use crate::scene::shapes;
+use crate::target::{Target, TargetPlan};
 
 /// How long the host lets submitted work wait.
 const LATE: Duration = Duration::from_millis(50);
@@ -66,9 +69,7 @@ pub(super) fn timeline() -> Result<Vec<u8>> {
     submit(&gpu, gpu.queue, first, semaphore, [1, 2])?;
     submit(&gpu, gpu.queue, then, semaphore, [2, 3])?;
     sleep(LATE);
-    let info = vk::SemaphoreSignalInfo::default().semaphore(semaphore).value(1);
-    // SAFETY: the semaphore is the device's.
-    unsafe { calls.signal_semaphore(&info) }?;
+    signal(&calls, semaphore, 1)?;
     wait(&calls, semaphore, 3)?;
     read(&gpu, target.images.finished())
 }
@@ -82,6 +83,40 @@ pub(super) fn timeline_queue() -> Result<Vec<u8>> {
     submit(&gpu, gpu.queue, first, semaphore, [0, 1])?;
     submit(&gpu, gpu.queue, then, semaphore, [1, 2])?;
     wait(&calls, semaphore, 2)?;
+    read(&gpu, target.images.finished())
+}
+
+/// A command buffer twice, each time in a submission that the host lets go later.
+pub(super) fn timeline_twice() -> Result<Vec<u8>> {
+    let gpu = Gpu::with(ask)?;
+    let calls = timeline_semaphore::Device::new(&gpu.host.instance, &gpu.device);
+    let semaphore = timeline_semaphore(&gpu)?;
+    let target = Target::new(&gpu, TargetPlan::default())?;
+    let plan = Plan::new(&gpu, &target)?;
+    let pipeline = plan.create(&gpu)?;
+    let recorder = Recorder::new(&gpu, vk::CommandBufferUsageFlags::SIMULTANEOUS_USE)?;
+    recorder.pass(&target);
+    recorder.bind(pipeline);
+    recorder.shapes(plan.layout, &shapes());
+    recorder.end_pass();
+    let buffer = recorder.end()?;
+    submit(&gpu, gpu.queue, buffer, semaphore, [1, 2])?;
+    submit(&gpu, gpu.queue, buffer, semaphore, [2, 3])?;
+    signal(&calls, semaphore, 1)?;
+    wait(&calls, semaphore, 3)?;
+    read(&gpu, target.images.finished())
+}
+
+/// A submission that waits for the host, and one behind it that does not.
+pub(super) fn timeline_behind() -> Result<Vec<u8>> {
+    let gpu = Gpu::with(ask)?;
+    let calls = timeline_semaphore::Device::new(&gpu.host.instance, &gpu.device);
+    let semaphore = timeline_semaphore(&gpu)?;
+    let (target, first, then) = halves(&gpu)?;
+    submit(&gpu, gpu.queue, first, semaphore, [1, 2])?;
+    gpu.submit(&[then])?;
+    signal(&calls, semaphore, 1)?;
+    gpu.wait()?;
     read(&gpu, target.images.finished())
 }
 
@@ -101,6 +136,12 @@ pub(super) fn timeline_two_queues() -> Result<Vec<u8>> {
     submit(&gpu, gpu.queue, first, semaphore, [0, 1])?;
     wait(&calls, semaphore, 2)?;
     read(&gpu, target.images.finished())
+}
+
+fn signal(calls: &timeline_semaphore::Device, semaphore: vk::Semaphore, value: u64) -> Result<()> {
+    let info = vk::SemaphoreSignalInfo::default().semaphore(semaphore).value(value);
+    // SAFETY: the semaphore is the device's.
+    Ok(unsafe { calls.signal_semaphore(&info) }?)
 }
 
 fn wait(calls: &timeline_semaphore::Device, semaphore: vk::Semaphore, value: u64) -> Result<()> {
