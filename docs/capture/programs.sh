@@ -16,7 +16,8 @@ python=target/programs/bin/python
 [ -x $python ] || python3 -m venv target/programs
 target/programs/bin/pip install --quiet --disable-pip-version-check pygfx rendercanvas pillow datoviz pyvista
 
-cargo build --locked --release --workspace
+screendoor=${SCREENDOOR:-target/release/screendoor}
+[ -n "${SCREENDOOR:-}" ] || cargo build --locked --release --workspace
 export XDG_RUNTIME_DIR=${XDG_RUNTIME_DIR:-$(mktemp -d)}
 # Without a display there is one of our own.
 [ -n "${DISPLAY:-}" ] || exec xvfb-run --auto-servernum "$0"
@@ -37,7 +38,7 @@ try() {
     start=$(date +%s.%N)
     timeout 60 "${alone[@]}" "$@" >"$out/alone.txt" 2>&1 || true
     middle=$(date +%s.%N)
-    if ! LIBGL_ALWAYS_SOFTWARE=1 timeout 120 target/release/screendoor capture --vulkan -q --check "${given[@]}" \
+    if ! LIBGL_ALWAYS_SOFTWARE=1 timeout 120 "$screendoor" capture --vulkan -q --check "${given[@]}" \
         --json "$out/$name.json" -o "$out/$name.arrow" -- "$@" >"$out/$name.txt" 2>&1; then
         echo "| $name | $interface | failed: $(grep error "$out/$name.txt" | head -n 1) | | | | |"
         return

@@ -3,36 +3,43 @@
 use crate::document::{Section, Text, code};
 use crate::results::beyond::{scenes, share, two};
 use crate::results::ratios::{OnScenes, holding};
-use crate::results::splats::layers;
 use screendoor_study::study::analysis::{ROUNDING, RunName, ratio, ratio_on};
 use screendoor_study::study::results::Results;
+use screendoor_trace::param::Options;
 
 /// Samples at which every scene is shown.
 const SHOWN: u32 = 8;
+/// What drew the scenes, and what stands for depth.
+const DRAWN: [(&str, &str, &str); 4] = [
+    ("glass", "pygfx (WebGPU)", "depths"),
+    ("shells", "VTK (OpenGL over zink)", "depths"),
+    ("markers", "datoviz", "painted"),
+    ("cards", "Qt Quick", "painted"),
+];
 
 /// The part's only section.
 pub(super) fn section(results: &Results) -> Section {
     let mut section = Section::new("Frames of four programs");
     section.paragraph(format!(
-        "No publication's: what each design would have done for the fragments of {}, as a Vulkan layer recorded \
-         them. `glass` is drawn by pygfx, `shells` by VTK (OpenGL over zink), `markers` by datoviz, `cards` by Qt \
-         Quick (sources in [capture/programs](capture/programs)). Errors are over the covered pixels, in 1/255 of \
-         the values that the program blends, against the exact picture of the same fragments. `{{n}}` is the number \
-         of samples. An RMSE below {ROUNDING:.2}, which no 8-bit picture shows, counts as that in any share.",
+        "No publication's: what each design would have done for the fragments of four programs \
+         ([sources](capture/programs)), as a Vulkan layer recorded them: {}. Errors are over the covered pixels, in \
+         1/255 of the values that the program blends, against the exact picture of the same fragments. `{{n}}` is the \
+         number of samples. An RMSE below {ROUNDING:.2}, which no 8-bit picture shows, counts as that in any share.",
         frames(results)
     ));
     section.paragraph(
-        "`glass` and `shells` have depths: what is opaque hides what is behind it, and `blend` is the frame as the \
-         program shows it, blended in whatever order it draws. `markers` and `cards` are painted without a depth \
-         test: the depth of a fragment is its place in the order of drawing, so that `blend` is right there by \
-         construction, and the other designs find out again an order that the program had given. A recorded \
-         fragment covers its whole pixel: there are no edges within pixels, and nothing is said of antialiasing.",
+        "Frames with depths are drawn with depth tests; `blend` is what the program shows of them, in whatever order \
+         it draws. Painted frames have no depth test: a fragment's depth is its place in the order of drawing, an \
+         order that `blend` alone needs and that is right by construction, so that the other designs pay for what \
+         the program had given. They come from back to front, one of the two orders in which `residual` is exact \
+         ([RESIDUAL.md](RESIDUAL.md)). A recorded fragment covers its whole pixel: there are no edges within \
+         pixels, so that nothing is said of antialiasing.",
     );
     if results.scenes.is_empty() {
         return section;
     }
     section.paragraph(format!("**In short**: {}", verdict(results)));
-    section.parts.extend([layers(results), errors(results), shares(results)]);
+    section.parts.extend([drawn(results), errors(results), shares(results)]);
     section
 }
 
@@ -67,7 +74,8 @@ fn verdict(results: &Results) -> String {
             .filter_map(|scene| ratio_on(results, scene, run, to).map(|e| (scene.to_string(), e)));
         let mean = ratio(results, run, to).ok()?.value;
         let range = OnScenes(each.collect()).range();
-        Some(format!("`{series}` ({} bytes) {}, {range}", bytes(results, series), share(mean)))
+        let name = series.replace("{n}", &SHOWN.to_string());
+        Some(format!("`{name}` ({} bytes) {}, {range}", bytes(results, series), share(mean)))
     };
     let told = ["residual", "residual:per=sample,errors=8", "merging:layers={n}", "mboit"];
     let gains: Vec<String> = told.into_iter().filter_map(gain).collect();
@@ -100,6 +108,38 @@ fn bytes(results: &Results, series: &str) -> String {
     record.map_or("—".to_string(), |record| {
         record.state_bytes().map_or("grows".to_string(), |bytes| format!("{bytes:.0}"))
     })
+}
+
+/// What the scenes are.
+fn drawn(results: &Results) -> Section {
+    let mut part = Section::new("The frames");
+    let rows = results.scenes.iter().map(|scene| {
+        let t = &scene.statistics;
+        let known = DRAWN.iter().find(|(name, ..)| *name == scene.name);
+        let (_, program, order) = known.unwrap_or(&("", "—", "—"));
+        [
+            scene.name.clone(),
+            program.to_string(),
+            order.to_string(),
+            scene.space.name().to_string(),
+            t.fragments.to_string(),
+            format!("{:.1}", t.depth_complexity.mean),
+            t.depth_complexity.max.to_string(),
+            two(t.alpha.mean),
+        ]
+    });
+    let header = [
+        "scene",
+        "drawn by",
+        "order",
+        "values",
+        "fragments",
+        "a covered pixel",
+        "most",
+        "mean alpha",
+    ];
+    part.table(header, rows);
+    part
 }
 
 /// Every design's error on every scene.

@@ -83,7 +83,7 @@ pub(super) fn in_short(b: &Beyond) -> Vec<Text> {
 }
 
 /// What the scenes are.
-pub(super) fn layers(results: &Results) -> Section {
+fn layers(results: &Results) -> Section {
     let mut part = Section::new("The scenes");
     let rows = results.scenes.iter().map(|scene| {
         let t = &scene.statistics;
