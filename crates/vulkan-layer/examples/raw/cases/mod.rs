@@ -102,7 +102,7 @@ pub(crate) const CASES: &[Case] = &[
     case("push-descriptors", "a set written by commands", Picture(descriptors::push_descriptors)),
     case("push-compute", "descriptors pushed for computing in between", Picture(descriptors::push_compute)),
     case("push-above", "a pushed set stays over a pipeline without it", Picture(descriptors::push_above)),
-    case("most-dynamic", "all descriptors with dynamic offsets that there are", Picture(descriptors::most_dynamic)),
+    case("most-dynamic", "all descriptors with dynamic offsets that a stage has", Picture(descriptors::most_dynamic)),
     case("indexed", "vertex, instance and index buffers", Picture(indirect::indexed)),
     case("indexed-indirect", "the same, each draw's numbers in a buffer", Picture(indirect::indexed_indirect)),
     case("indirect", "each draw's numbers in a buffer", Picture(indirect::indirect)),
