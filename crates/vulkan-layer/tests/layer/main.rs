@@ -8,7 +8,7 @@ mod run;
 
 use std::collections::BTreeMap;
 
-use run::{Capture, Ran, cases, raw, skipped};
+use run::{Capture, Ran, cases, raw, skipped, unheard};
 use screendoor_vulkan_layer::log::{Draw, Event};
 use screendoor_vulkan_layer::settings::{Settings, Span};
 
@@ -241,6 +241,41 @@ fn nobody_waits_long_for_what_comes_later() {
         let more = ran.took.saturating_sub(plain.took);
         assert!(more.as_millis() < 1000, "{case} takes {more:?} longer");
     }
+}
+
+#[test]
+fn one_frame_of_many_is_captured_alone() {
+    if skipped() {
+        return;
+    }
+    let settings = Settings { span: Span::Frames(6, 6), ..Settings::default() };
+    let (ran, captures) = captured("resize", &settings);
+    let shown = ran.text.contains("frames are presented");
+    let none = captures.iter().all(|c| c.records.is_empty());
+    assert!(none, "resize has no frame 6");
+    let settings = Settings { span: Span::Frames(3, 3), ..Settings::default() };
+    let captures = captured("resubmit-frames", &settings).1;
+    if !shown {
+        println!("skipped: nothing is presented here");
+        return;
+    }
+    let drawing: Vec<_> = captures[0].submissions().filter(|s| s.records > 0).collect();
+    assert!(drawing.len() == 1 && drawing[0].frame == 3, "{} submissions", drawing.len());
+    assert!(captures[0].ended());
+    captures[0].check("resubmit-frames");
+}
+
+#[test]
+fn nobody_has_to_listen() {
+    if skipped() {
+        return;
+    }
+    let settings = Settings { folder: Some("/nowhere/at/all".into()), ..Settings::default() };
+    let plain = raw("plain", None);
+    assert!(raw("plain", Some(&settings)).text.contains("cannot be written"));
+    let deaf = unheard("plain", &settings);
+    assert_eq!(deaf.code, Some(0));
+    assert!(deaf.picture == plain.picture);
 }
 
 #[test]
