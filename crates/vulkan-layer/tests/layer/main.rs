@@ -13,7 +13,7 @@ use screendoor_vulkan_layer::log::{Draw, Event};
 use screendoor_vulkan_layer::settings::{Settings, Span};
 
 /// Cases of which draws are refused, and why.
-const REFUSED: [(&str, &str); 14] = [
+const REFUSED: [(&str, &str); 15] = [
     ("integer-target", "its output is an integer"),
     ("sets-unasked", "its layout uses all"),
     ("geometry", "it has a geometry shader"),
@@ -25,6 +25,7 @@ const REFUSED: [(&str, &str); 14] = [
     ("indirect-count-core", "the number of its draws lies in a buffer"),
     ("draw-id", "gl_DrawID"),
     ("multi-draw", "several instances"),
+    ("conditional", "on a condition"),
     ("push-above", "pushed descriptors"),
     ("timeline-twice", "its command buffer is run twice"),
     ("very-many-draws", "more draws are recorded at a time"),

@@ -82,6 +82,7 @@ pub(crate) const CASES: &[Case] = &[
     case("two-targets", "two colours, each blended in its way; OUT has both", Picture(blends::two_targets)),
     case("secondaries", "two secondaries in another order than recorded", Picture(commands::secondaries)),
     case("secondary-twice", "a secondary twice in a primary", Picture(commands::secondary_twice)),
+    case("conditional", "draws on conditions that lie in a buffer", Picture(commands::conditional)),
     case("twice", "a primary twice in one submission", Picture(commands::twice)),
     case("again", "a primary in two submissions", Picture(commands::again)),
     case("recorded-again", "a primary thrown away and recorded again", Picture(commands::recorded_again)),
