@@ -8,13 +8,14 @@ use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError, RwLock};
 use ash::vk::{self, Handle};
 
 use crate::abi::{DeviceLink, LINK, LOADER_DATA, SetLoaderData, layer_info, slice};
+use crate::counts::Counts;
 use crate::creation::{Asked, Enabled};
 use crate::instance::{HIDDEN, Instance, Physical, Registry, enter, instance, leave, most, of};
-use crate::layouts::Counts;
 use crate::memory::Buffer;
 use crate::objects::Objects;
+use crate::own::Own;
 use crate::pending::settle;
-use crate::queues::{Own, Queue};
+use crate::queues::Queue;
 use crate::recorder::Recorder;
 use crate::resources::Resources;
 use crate::settings::Settings;

@@ -6,7 +6,7 @@ use ash::vk;
 
 use crate::device::{self, create_device, destroy_device};
 use crate::{barriers, commands, draws, dynamic, images, instance, layouts};
-use crate::{passes, pipelines, queues, submit, writes};
+use crate::{passes, pipelines, queues, rendering, submit, swapchains, writes};
 
 /// Functions by name.
 macro_rules! hooks {
@@ -51,29 +51,29 @@ hooks! {
             => images::requirements,
         b"vkCreateImageView" => images::create_image_view,
         b"vkDestroyImageView" => images::destroy_image_view,
-        b"vkCreateSwapchainKHR" => images::create_swapchain,
-        b"vkCreateSharedSwapchainsKHR" => images::create_swapchains,
-        b"vkAcquireNextImageKHR" => images::acquire,
-        b"vkAcquireNextImage2KHR" => images::acquire2,
-        b"vkDestroySwapchainKHR" => images::destroy_swapchain,
-        b"vkGetSwapchainImagesKHR" => images::swapchain_images,
+        b"vkCreateSwapchainKHR" => swapchains::create_swapchain,
+        b"vkCreateSharedSwapchainsKHR" => swapchains::create_swapchains,
+        b"vkAcquireNextImageKHR" => swapchains::acquire,
+        b"vkAcquireNextImage2KHR" => swapchains::acquire2,
+        b"vkDestroySwapchainKHR" => swapchains::destroy_swapchain,
+        b"vkGetSwapchainImagesKHR" => swapchains::swapchain_images,
 
         b"vkCreateRenderPass" => passes::create_render_pass,
         b"vkCreateRenderPass2" | b"vkCreateRenderPass2KHR" => passes::create_render_pass2,
         b"vkDestroyRenderPass" => passes::destroy_render_pass,
         b"vkCreateFramebuffer" => passes::create_framebuffer,
         b"vkDestroyFramebuffer" => passes::destroy_framebuffer,
-        b"vkCmdBeginRenderPass" => passes::begin_pass,
-        b"vkCmdBeginRenderPass2" | b"vkCmdBeginRenderPass2KHR" => passes::begin_pass2,
-        b"vkCmdNextSubpass" => passes::subpass,
-        b"vkCmdNextSubpass2" | b"vkCmdNextSubpass2KHR" => passes::subpass2,
-        b"vkCmdEndRenderPass" => passes::end_pass,
-        b"vkCmdEndRenderPass2" | b"vkCmdEndRenderPass2KHR" => passes::end_pass2,
-        b"vkCmdBeginRendering" | b"vkCmdBeginRenderingKHR" => passes::begin_rendering,
-        b"vkCmdEndRendering" | b"vkCmdEndRenderingKHR" => passes::end_rendering,
+        b"vkCmdBeginRenderPass" => rendering::begin_pass,
+        b"vkCmdBeginRenderPass2" | b"vkCmdBeginRenderPass2KHR" => rendering::begin_pass2,
+        b"vkCmdNextSubpass" => rendering::subpass,
+        b"vkCmdNextSubpass2" | b"vkCmdNextSubpass2KHR" => rendering::subpass2,
+        b"vkCmdEndRenderPass" => rendering::end_pass,
+        b"vkCmdEndRenderPass2" | b"vkCmdEndRenderPass2KHR" => rendering::end_pass2,
+        b"vkCmdBeginRendering" | b"vkCmdBeginRenderingKHR" => rendering::begin_rendering,
+        b"vkCmdEndRendering" | b"vkCmdEndRenderingKHR" => rendering::end_rendering,
 
         b"vkCmdSetRenderingAttachmentLocations" | b"vkCmdSetRenderingAttachmentLocationsKHR"
-            => passes::set_locations,
+            => rendering::set_locations,
 
         b"vkCreateDescriptorUpdateTemplate" | b"vkCreateDescriptorUpdateTemplateKHR"
             => layouts::create_template,

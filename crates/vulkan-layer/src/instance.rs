@@ -8,7 +8,7 @@ use std::sync::{Arc, LazyLock, PoisonError, RwLock};
 use ash::vk::{self, Handle};
 
 use crate::abi::{InstanceLink, LINK, layer_info};
-use crate::layouts::Counts;
+use crate::counts::Counts;
 use crate::table::{InstanceTable, next};
 
 pub(crate) struct Instance {

@@ -5,7 +5,8 @@ use ash::vk;
 use crate::device::Device;
 use crate::memory::Buffer;
 use crate::objects::Image;
-use crate::queues::{Queue, Waited, run};
+use crate::own::{Waited, run};
+use crate::queues::Queue;
 use crate::recorder::Recorder;
 use crate::table::next;
 

@@ -197,3 +197,50 @@ unsafe fn replace(
     stage.module = module;
     Ok(module)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::abi::find;
+
+    #[test]
+    fn a_chain_is_copied_as_far_as_it_is_changed() {
+        use vk::StructureType as S;
+        let mut tail = vk::PipelineRobustnessCreateInfoEXT::default();
+        let mut flags = vk::PipelineCreateFlags2CreateInfoKHR::default().flags(
+            vk::PipelineCreateFlags2KHR::DERIVATIVE
+                | vk::PipelineCreateFlags2KHR::DISABLE_OPTIMIZATION,
+        );
+        let mut feedback = vk::PipelineCreationFeedbackCreateInfo::default();
+        let formats = [vk::Format::R8G8B8A8_UNORM];
+        let mut rendering =
+            vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&formats);
+        flags.p_next = (&raw mut tail).cast();
+        feedback.p_next = (&raw mut flags).cast();
+        rendering.p_next = (&raw mut feedback).cast();
+        let first = (&raw const rendering).cast();
+        unsafe {
+            let copy = Chain::copy(first, &[], true).unwrap();
+            let kinds: Vec<_> = chain(copy.first).map(|s| (*s).s_type).collect();
+            let tail = S::PIPELINE_ROBUSTNESS_CREATE_INFO_EXT;
+            let kept = S::PIPELINE_CREATE_FLAGS_2_CREATE_INFO_KHR;
+            assert!(kinds == [S::PIPELINE_RENDERING_CREATE_INFO, kept, tail]);
+            let ours = find::<vk::PipelineCreateFlags2CreateInfoKHR<'_>>(copy.first, kept).unwrap();
+            assert!((*ours).flags == vk::PipelineCreateFlags2KHR::DISABLE_OPTIMIZATION);
+            assert!(flags.flags != (*ours).flags);
+            // The program's own tail, and nothing copied where nothing is changed.
+            let theirs = find::<c_void>(first, tail).unwrap();
+            assert!(find::<c_void>(copy.first, tail) == Some(theirs));
+            assert!(Chain::copy(theirs, &[], true).unwrap().first == theirs.cast_const());
+        }
+    }
+
+    #[test]
+    fn what_is_not_known_is_not_copied() {
+        let mut flags = vk::PipelineCreateFlags2CreateInfoKHR::default();
+        let unknown =
+            vk::SubmitInfo { p_next: (&raw mut flags).cast(), ..vk::SubmitInfo::default() };
+        let why = unsafe { Chain::copy((&raw const unknown).cast(), &[], true) };
+        assert!(why.err().unwrap().contains("is not known"));
+    }
+}

@@ -8,12 +8,12 @@ mod run;
 
 use std::collections::BTreeMap;
 
-use run::{Capture, Ran, cases, raw, skipped};
+use run::{Capture, Ran, cases, raw, skipped, unheard};
 use screendoor_vulkan_layer::log::{Draw, Event};
 use screendoor_vulkan_layer::settings::{Settings, Span};
 
 /// Cases of which draws are refused, and why.
-const REFUSED: [(&str, &str); 14] = [
+const REFUSED: [(&str, &str); 15] = [
     ("integer-target", "its output is an integer"),
     ("sets-unasked", "its layout uses all"),
     ("geometry", "it has a geometry shader"),
@@ -25,6 +25,7 @@ const REFUSED: [(&str, &str); 14] = [
     ("indirect-count-core", "the number of its draws lies in a buffer"),
     ("draw-id", "gl_DrawID"),
     ("multi-draw", "several instances"),
+    ("conditional", "on a condition"),
     ("push-above", "pushed descriptors"),
     ("timeline-twice", "its command buffer is run twice"),
     ("very-many-draws", "more draws are recorded at a time"),
@@ -241,6 +242,41 @@ fn nobody_waits_long_for_what_comes_later() {
         let more = ran.took.saturating_sub(plain.took);
         assert!(more.as_millis() < 1000, "{case} takes {more:?} longer");
     }
+}
+
+#[test]
+fn one_frame_of_many_is_captured_alone() {
+    if skipped() {
+        return;
+    }
+    let settings = Settings { span: Span::Frames(6, 6), ..Settings::default() };
+    let (ran, captures) = captured("resize", &settings);
+    let shown = ran.text.contains("frames are presented");
+    let none = captures.iter().all(|c| c.records.is_empty());
+    assert!(none, "resize has no frame 6");
+    let settings = Settings { span: Span::Frames(3, 3), ..Settings::default() };
+    let captures = captured("resubmit-frames", &settings).1;
+    if !shown {
+        println!("skipped: nothing is presented here");
+        return;
+    }
+    let drawing: Vec<_> = captures[0].submissions().filter(|s| s.records > 0).collect();
+    assert!(drawing.len() == 1 && drawing[0].frame == 3, "{} submissions", drawing.len());
+    assert!(captures[0].ended());
+    captures[0].check("resubmit-frames");
+}
+
+#[test]
+fn nobody_has_to_listen() {
+    if skipped() {
+        return;
+    }
+    let settings = Settings { folder: Some("/nowhere/at/all".into()), ..Settings::default() };
+    let plain = raw("plain", None);
+    assert!(raw("plain", Some(&settings)).text.contains("cannot be written"));
+    let deaf = unheard("plain", &settings);
+    assert_eq!(deaf.code, Some(0));
+    assert!(deaf.picture == plain.picture);
 }
 
 #[test]

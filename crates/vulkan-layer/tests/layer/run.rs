@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use screendoor_vulkan_layer::log::{
@@ -32,6 +32,19 @@ pub(crate) struct Ran {
 
 /// Runs a case, under the layer where there are settings.
 pub(crate) fn raw(case: &str, settings: Option<&Settings>) -> Ran {
+    ran(case, settings, |command| command.output().unwrap())
+}
+
+/// The same while what it says goes nowhere.
+pub(crate) fn unheard(case: &str, settings: &Settings) -> Ran {
+    ran(case, Some(settings), |command| {
+        let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+        drop(child.stderr.take());
+        child.wait_with_output().unwrap()
+    })
+}
+
+fn ran(case: &str, settings: Option<&Settings>, run: impl FnOnce(&mut Command) -> Output) -> Ran {
     let folder = super::tempfile();
     let out = folder.join("out");
     let mut command = Command::new(program());
@@ -50,7 +63,7 @@ pub(crate) fn raw(case: &str, settings: Option<&Settings>) -> Ran {
         command.envs(settings.variables());
     }
     let start = Instant::now();
-    let output = command.output().unwrap();
+    let output = run(&mut command);
     let took = start.elapsed();
     let text = String::from_utf8_lossy(&output.stdout) + String::from_utf8_lossy(&output.stderr);
     let ran = Ran {

@@ -1,10 +1,13 @@
 //! Command buffers: secondaries, and the same one submitted again.
 
+use ash::ext::conditional_rendering;
 use ash::vk;
 use vk::CommandBufferUsageFlags as Usage;
 
+use super::one_pass;
 use crate::failure::Result;
 use crate::gpu::Gpu;
+use crate::memory::Buffer;
 use crate::pipeline::Plan;
 use crate::record::{Recorder, read};
 use crate::scene::{Shape, shapes};
@@ -12,6 +15,38 @@ use crate::target::{Target, TargetPlan};
 
 pub(super) fn secondaries() -> Result<Vec<u8>> {
     executed(Usage::ONE_TIME_SUBMIT, |first, second| vec![second, first])
+}
+
+/// Of two halves, one is drawn on a condition that holds, the other on none that does.
+pub(super) fn conditional() -> Result<Vec<u8>> {
+    let gpu = Gpu::with(|opening| {
+        opening.extension(conditional_rendering::NAME)?;
+        opening.features::<vk::PhysicalDeviceConditionalRenderingFeaturesEXT<'_>>(&[(
+            |f| &mut f.conditional_rendering,
+            "conditionalRendering",
+        )])
+    })?;
+    let calls = conditional_rendering::Device::new(&gpu.host.instance, &gpu.device);
+    let target = Target::new(&gpu, TargetPlan::default())?;
+    let plan = Plan::new(&gpu, &target)?;
+    let pipeline = plan.create(&gpu)?;
+    let usage = vk::BufferUsageFlags::CONDITIONAL_RENDERING_EXT;
+    let conditions = Buffer::of(&gpu, &[1, 0], usage)?;
+    let all = shapes();
+    one_pass(&gpu, &target, |recorder| {
+        recorder.bind(pipeline);
+        recorder.shapes(plan.layout, &all[..2]);
+        for (at, some) in [(0, &all[2..4]), (4, &all[4..])] {
+            let info = vk::ConditionalRenderingBeginInfoEXT::default()
+                .buffer(conditions.handle)
+                .offset(at);
+            // SAFETY: the buffer holds two conditions.
+            unsafe { (calls.fp().cmd_begin_conditional_rendering_ext)(recorder.buffer, &info) }
+            recorder.shapes(plan.layout, some);
+            // SAFETY: it was begun.
+            unsafe { (calls.fp().cmd_end_conditional_rendering_ext)(recorder.buffer) }
+        }
+    })
 }
 
 pub(super) fn secondary_twice() -> Result<Vec<u8>> {

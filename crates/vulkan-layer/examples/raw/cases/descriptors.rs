@@ -256,13 +256,22 @@ fn pushed(compute: bool) -> Result<Vec<u8>> {
     })
 }
 
-/// As many descriptors with dynamic offsets as there are, and samplers that nobody looks at.
+/// As many descriptors with dynamic offsets as a fragment shader can have, and samplers that nobody
+/// looks at.
 pub(super) fn most_dynamic() -> Result<Vec<u8>> {
     let gpu = Gpu::plain()?;
+    let limits = &gpu.host.limits;
+    let most = [
+        limits.max_descriptor_set_uniform_buffers_dynamic,
+        limits.max_descriptor_set_uniform_buffers,
+        limits.max_per_stage_descriptor_uniform_buffers,
+        // The target is one, too.
+        limits.max_per_stage_resources - 1,
+    ];
     let binding = vk::DescriptorSetLayoutBinding {
         descriptor_type: Kind::UNIFORM_BUFFER_DYNAMIC,
-        descriptor_count: gpu.host.limits.max_descriptor_set_uniform_buffers_dynamic,
-        stage_flags: vk::ShaderStageFlags::VERTEX,
+        descriptor_count: most.into_iter().min().unwrap_or(1),
+        stage_flags: vk::ShaderStageFlags::FRAGMENT,
         // Of descriptors that are no samplers it is ignored.
         p_immutable_samplers: std::ptr::dangling(),
         ..vk::DescriptorSetLayoutBinding::default()

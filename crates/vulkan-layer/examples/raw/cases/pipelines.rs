@@ -28,7 +28,6 @@ pub(super) fn discarded() -> Result<Vec<u8>> {
         let info = vk::GraphicsPipelineCreateInfo {
             stage_count: 1,
             p_rasterization_state: &raster,
-            p_viewport_state: std::ptr::dangling(),
             p_multisample_state: std::ptr::dangling(),
             p_depth_stencil_state: std::ptr::dangling(),
             p_color_blend_state: std::ptr::dangling(),
