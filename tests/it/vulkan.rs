@@ -16,7 +16,7 @@ use serde_json::Value;
 const PROGRAM: &str = env!("CARGO_BIN_EXE_screendoor");
 
 /// How far a replay may be from an 8-bit picture, of 255: blending rounds at each layer.
-const ROUNDING: f64 = 3.0;
+const ROUNDING: f64 = 3.5;
 
 fn folder() -> tempfile::TempDir {
     tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap()
@@ -58,11 +58,13 @@ fn greatest(case: &str, document: &Value) -> f64 {
 }
 
 /// Cases that cannot be held against their picture, or are far from it, and why.
-const APART: [(&str, &str); 3] = [
+const APART: [(&str, &str); 5] = [
     ("integer-target", "whole numbers"),
     ("resolve-command", "not resolved by its last pass"),
-    // Its submission waits for the host.
+    // Their submissions wait for the host.
     ("timeline", "no picture"),
+    ("timeline-behind", "no picture"),
+    ("timeline-twice", "no picture"),
 ];
 
 #[test]
@@ -211,7 +213,7 @@ fn a_program_that_is_killed_leaves_no_trace() {
     let arguments = ["--frame", "2", "-o", "killed.arrow"];
     let (output, _) = capture(folder.path(), &arguments, &program);
     let said = told(&output);
-    assert!(!output.status.success() && said.contains("signal 9"), "{said}");
+    assert!(!output.status.success() && said.contains("ended within frame 2"), "{said}");
     let left: Vec<_> = std::fs::read_dir(folder.path())
         .unwrap()
         .map(|e| e.unwrap().file_name().into_string().unwrap())

@@ -276,9 +276,9 @@ impl Recorder {
             return;
         }
         let (frame, all) = (self.frame, self.of_frame);
-        if self.wants(self.submission) {
-            self.entry(&Entry::Present(log::Present { frame, images }));
-        }
+        // Frames are counted in any case, so that one knows how many there were.
+        let images = if self.wants(self.submission) { images } else { Vec::new() };
+        self.entry(&Entry::Present(log::Present { frame, images }));
         let whole = !std::mem::take(&mut self.overflowed);
         self.of_frame = 0;
         self.known.clear();
