@@ -42,6 +42,7 @@ fn before(d: &Device, buffer: vk::CommandBuffer, command: Command) {
             () if full => FULL,
             () if !command.refused.is_empty() => command.refused,
             () if commands.conditional => CONDITIONAL,
+            () if pipeline.fixed.alpha_to_one(&commands.dynamic) => ALPHA_TO_ONE,
             () => commands.refused,
         };
         commands.slots.extend(slot);
@@ -84,6 +85,7 @@ fn before(d: &Device, buffer: vk::CommandBuffer, command: Command) {
 const GRAPHICS: vk::PipelineBindPoint = vk::PipelineBindPoint::GRAPHICS;
 
 const FULL: &str = "more draws are recorded at a time than can be told apart";
+const ALPHA_TO_ONE: &str = "its alpha is replaced by 1 (alpha to one)";
 const PUSHED: &str = "it leaves pushed descriptors alone, which our set would disturb";
 
 /// Whether the parts of a multi-draw of `n` can be drawn one by one: not where a shader asks which of

@@ -18,6 +18,7 @@ pub(crate) struct Dynamic {
     pub constants: Option<[f32; 4]>,
     pub logic_op: Option<bool>,
     pub alpha_to_coverage: Option<bool>,
+    pub alpha_to_one: Option<bool>,
     pub depth_test: Option<bool>,
     pub depth_write: Option<bool>,
     pub depth_op: Option<i32>,
@@ -38,6 +39,12 @@ pub(crate) struct Static {
 }
 
 impl Static {
+    /// Whether commands have a draw's alpha replaced by 1.
+    pub(crate) fn alpha_to_one(&self, set: &Dynamic) -> bool {
+        let dynamic = self.dynamic.contains(&vk::DynamicState::ALPHA_TO_ONE_ENABLE_EXT);
+        dynamic && set.alpha_to_one == Some(true)
+    }
+
     /// As it is for a draw.
     pub(crate) fn with(&self, set: &Dynamic) -> State {
         use vk::DynamicState as D;
@@ -106,6 +113,7 @@ setters! {
     stencil_test: set_stencil_test, stencil_test, |value: vk::Bool32| value == vk::TRUE;
     bounds: set_bounds, bounds, |value: vk::Bool32| value == vk::TRUE;
     logic_op: set_logic_op, logic_op, |value: vk::Bool32| value == vk::TRUE;
+    alpha_to_one: set_alpha_to_one, alpha_to_one, |value: vk::Bool32| value == vk::TRUE;
     alpha_to_coverage: set_alpha_to_coverage, alpha_to_coverage, |value: vk::Bool32| value == vk::TRUE;
 }
 

@@ -140,6 +140,7 @@ hooks! {
         b"vkCmdSetColorWriteEnableEXT" => dynamic::write_enable,
         b"vkCmdSetLogicOpEnableEXT" => dynamic::logic_op,
         b"vkCmdSetAlphaToCoverageEnableEXT" => dynamic::alpha_to_coverage,
+        b"vkCmdSetAlphaToOneEnableEXT" => dynamic::alpha_to_one,
         b"vkCmdSetDepthTestEnable" | b"vkCmdSetDepthTestEnableEXT" => dynamic::depth_test,
         b"vkCmdSetDepthWriteEnable" | b"vkCmdSetDepthWriteEnableEXT" => dynamic::depth_write,
         b"vkCmdSetDepthCompareOp" | b"vkCmdSetDepthCompareOpEXT" => dynamic::depth_op,

@@ -180,14 +180,6 @@ unsafe fn refused(
         {
             crate::passes::RATED
         }
-        () if set(&[
-            D::RASTERIZATION_SAMPLES_EXT,
-            D::SAMPLE_MASK_EXT,
-            D::ALPHA_TO_ONE_ENABLE_EXT,
-        ]) =>
-        {
-            "its samples are set by commands"
-        }
         () if unsafe { find::<std::ffi::c_void>(info.p_next, locations) }.is_some() => {
             "its outputs go to other attachments"
         }

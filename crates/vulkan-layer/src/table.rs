@@ -206,6 +206,7 @@ table! {
         set_write_mask: PFN_vkCmdSetColorWriteMaskEXT = c"vkCmdSetColorWriteMaskEXT",
         set_write_enable: PFN_vkCmdSetColorWriteEnableEXT = c"vkCmdSetColorWriteEnableEXT",
         set_logic_op: PFN_vkCmdSetLogicOpEnableEXT = c"vkCmdSetLogicOpEnableEXT",
+        set_alpha_to_one: PFN_vkCmdSetAlphaToOneEnableEXT = c"vkCmdSetAlphaToOneEnableEXT",
         set_alpha_to_coverage: PFN_vkCmdSetAlphaToCoverageEnableEXT
             = c"vkCmdSetAlphaToCoverageEnableEXT",
         set_depth_test: PFN_vkCmdSetDepthTestEnable

@@ -239,7 +239,7 @@ impl<'a> Making<'a> {
                 push(&Fragment {
                     x: x as u16,
                     y: y as u16,
-                    coverage: SampleMask(self.samples),
+                    coverage: self.conversion.spread(self.samples),
                     depth,
                     colour,
                     alpha: 1.0,

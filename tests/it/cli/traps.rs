@@ -39,7 +39,7 @@ fn one_thing_given_for_another_is_told_with_what_to_do() {
         (&["info", "s.toml"], "screendoor study s.toml -o"),
         (&["replay", "a.png"], "'a.png' is a picture, and a trace is asked for"),
         (&["compare", "t.arrow", "t.arrow"], "screendoor replay t.arrow -o"),
-        (&["study", "t.arrow", "-o", "x"], "name it in a study file as trace"),
+        (&["study", "t.arrow", "s.toml", "-o", "x"], "screendoor study s.toml -o"),
         (&["study", "out", "-o", "x"], "screendoor report out"),
         (&["report", "s.toml"], "screendoor study s.toml -o"),
         (&["merge", "x", "s.toml"], "screendoor study s.toml -o"),

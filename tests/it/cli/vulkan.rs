@@ -169,10 +169,7 @@ fn options_for_scenes_and_for_programs_do_not_go_together() {
         (&["builtin:ramps", "--vulkan", "-o", "t.arrow"], &["[SCENE]", "--vulkan"]),
         (&["builtin:ramps", "--list"], &["[SCENE]", "--list"]),
         (&["builtin:ramps", "-o", "t.arrow", "--", "true"], &["[SCENE]", "[PROGRAM]"]),
-        (
-            &["--vulkan", "--samples", "4", "-o", "t.arrow", "--", "true"],
-            &["--samples", "--vulkan"],
-        ),
+        (&["--vulkan", "--size", "4x4", "-o", "t.arrow", "--", "true"], &["--size", "--vulkan"]),
         (&["--vulkan", "--gpu", "-o", "t.arrow", "--", "true"], &["--gpu", "--vulkan"]),
         (&["--vulkan", "--from", "k", "-o", "t.arrow", "--", "true"], &["--from", "[PROGRAM]"]),
         (&["--vulkan", "--from", "k", "--keep", "l", "-o", "t.arrow"], &["--from", "--keep"]),

@@ -35,7 +35,7 @@ pub fn programs(lab: &Lab<'_>) -> Result<Results> {
         None => Ok(found.results),
         Some(lost) => Err(Error::io(
             "read",
-            &folder.join(lost),
+            folder.join(lost),
             io::Error::new(io::ErrorKind::NotFound, "check it out again"),
         )),
     }
