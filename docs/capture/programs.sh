@@ -6,7 +6,7 @@ set -euo pipefail
 cd "$(dirname "$0")/../.."
 
 packages=(mesa-vulkan-drivers libvulkan1 vulkan-tools xvfb xauth mesa-utils glmark2-x11 gfxreconstruct extremetuxracer
-    qml-qt6 qml6-module-qtquick qml6-module-qtquick-window qml6-module-qtqml-workerscript mpv python3-venv)
+    qml-qt6 qml6-module-qtquick qml6-module-qtquick-window qml6-module-qtqml-workerscript python3-venv)
 if ! dpkg --status "${packages[@]}" >/dev/null 2>&1; then
     as_root=$([ "$(id -u)" = 0 ] || echo sudo)
     $as_root apt-get update --quiet --quiet
@@ -66,7 +66,5 @@ try shells "VTK, OpenGL, zink" --opengl -- $python $here/shells.py "$out/shells.
 try glass "pygfx, WebGPU" -- $python $here/glass.py "$out/glass.png"
 try markers "datoviz, Vulkan" -- $python $here/markers.py "$out/markers.png"
 QSG_RHI_BACKEND=vulkan try cards "Qt Quick, Vulkan" -- /usr/lib/qt6/bin/qml $here/cards.qml
-try mpv "Vulkan (libplacebo)" --stop -- mpv --no-config --no-audio --vo=gpu --gpu-api=vulkan --length=3 \
-    --osd-level=3 --osd-msg3=screendoor "av://lavfi:testsrc2=size=320x240:rate=25"
 try gfxrecon-replay "a recorded stream" -- gfxrecon-replay traces/programs/markers.gfxr
 rm -rf "$out"

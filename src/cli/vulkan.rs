@@ -278,12 +278,12 @@ impl Begun {
             Folder::Kept(folder) => folder.as_path(),
             Folder::Temporary(folder) => folder.path(),
         };
-        let (program, rest) =
-            arguments.program.split_first().unwrap_or((const { &OsString::new() }, &[]));
+        let mut words = arguments.program.iter().cloned();
+        let program = words.next().unwrap_or_default();
         let own = Settings::default();
         let run = Run {
             program: program.clone(),
-            arguments: rest.to_vec(),
+            arguments: words.collect(),
             settings: Settings {
                 folder: Some(folder.to_path_buf()),
                 span: arguments.span(),
@@ -307,7 +307,7 @@ impl Begun {
         }
         let captures = Captures::read(folder)?;
         if captures.is_empty() {
-            let (what, hint) = why_nothing(program, ended);
+            let (what, hint) = why_nothing(&program, ended);
             return Err(Error::unsupported(name, what, hint));
         }
         Ok(match ended {

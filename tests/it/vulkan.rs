@@ -205,6 +205,21 @@ fn a_program_that_presents_is_captured_frame_by_frame() {
 }
 
 #[test]
+#[ignore = "needs glxgears (Debian: mesa-utils), Mesa's OpenGL and a display"]
+fn opengl_over_zink_is_captured_and_the_program_ended() {
+    let folder = folder();
+    // Zink takes no software driver unless it is told to.
+    let program = ["env", "LIBGL_ALWAYS_SOFTWARE=1", "glxgears"];
+    let arguments = ["--opengl", "--stop", "--frame", "2", "--check", "-o", "t.arrow"];
+    let (output, document) = capture(folder.path(), &arguments, &program);
+    assert!(output.status.success(), "{}", told(&output));
+    // Opaque gears: nothing to round.
+    assert_eq!(greatest("glxgears", &document), 0.0);
+    assert!(document["refused"].as_array().unwrap().is_empty(), "{document}");
+    assert!(document["fragments"].as_u64().unwrap() > 10_000, "{document}");
+}
+
+#[test]
 #[ignore = "needs a Vulkan driver and the test program"]
 fn a_program_that_is_killed_leaves_no_trace() {
     let folder = folder();

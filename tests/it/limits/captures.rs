@@ -26,7 +26,7 @@ pub(super) fn records_take_what_memory_says() {
     let records = (0..RECORDS).map(|i| {
         let scattered = i.wrapping_mul(0x9e37_79b1);
         let slot = if i % 16 == 0 { scattered % draws } else { 0 };
-        let place = scattered % 512 | (scattered >> 9) % 512 << 16;
+        let place = (scattered % 512) | (((scattered >> 9) % 512) << 16);
         Record { place, primitive: scattered >> 18, ..record(slot, 0, 0.5) }
     });
     left.write(&kept, records, &[]);

@@ -36,10 +36,10 @@ fn drawn() -> (Made, Vec<[u8; 4]>) {
     let mut pixels = vec![clear.map(bits); 16];
     let colours = [[1.0, 0.0, 0.3, 0.3], [0.1, 0.9, 0.7, 0.8], [0.4, 0.4, 0.1, 0.05]];
     let mut records = Vec::new();
-    for x in 0..3 {
+    for (x, pixel) in pixels.iter_mut().enumerate().take(3) {
         for (primitive, colour) in colours.iter().enumerate().take(x + 1) {
             records.push(record(0, primitive as u32, x as u32, colour.map(|v: f64| v as f32)));
-            pixels[x] = over_it(pixels[x], *colour);
+            *pixel = over_it(*pixel, *colour);
         }
     }
     // As a GPU may append them.
