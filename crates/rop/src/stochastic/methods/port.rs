@@ -13,7 +13,7 @@ use screendoor_trace::error::Result;
 use screendoor_trace::param::{Param, Values};
 use screendoor_trace::trace::SampleMask;
 
-/// The port of a design made by [`with_methods`]: without sums, a device resolves it, and
+/// The port of a design made by [`with_methods`](super::with_methods): without sums, a device resolves it, and
 /// may give each sample a thread, where the design is for it.
 pub fn port<S, const N: usize>(
     (program, by_sample): (Shader, bool),
@@ -33,7 +33,7 @@ where
     port
 }
 
-/// The port of a design made by [`single_pass`]: the parameters that it does not have are what
+/// The port of a design made by [`single_pass`](super::single_pass): the parameters that it does not have are what
 /// they are by default.
 ///
 /// # Errors
