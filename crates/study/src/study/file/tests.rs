@@ -103,3 +103,23 @@ fn what_cannot_be_is_refused() {
         assert!(wrong.contains(says), "{wrong}");
     }
 }
+
+#[test]
+fn a_study_of_traces_has_what_they_serve() {
+    let place = |name: &str| {
+        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../traces").join(name)
+    };
+    let study = Study::of_traces(&[place("ramps.arrow"), place("glass.arrow")]).unwrap();
+    assert_eq!(study.samples, [4, 8, 16]);
+    assert_eq!(study.designs, Study::preset().unwrap().designs);
+    assert!(study.publications.is_empty());
+    let names: Vec<&str> = study.scenes.iter().map(|s| s.name.as_str()).collect();
+    assert_eq!(names, ["ramps", "glass"]);
+    assert!(study.scenes.iter().all(|s| s.trace.is_some() && s.source.is_none()));
+    // One of four samples a pixel serves no more.
+    let study = Study::of_traces(&[place("ramps.arrow"), place("glass-gpu.arrow")]).unwrap();
+    assert_eq!((&study.samples[..], &study.pictures[..]), (&[4][..], &[4][..]));
+    let twice = Study::of_traces(&[place("ramps.arrow"), place("./ramps.arrow")]);
+    assert!(twice.unwrap_err().to_string().contains("two of the traces are called ramps"));
+    assert!(Study::of_traces(&[place("none.arrow")]).is_err());
+}
