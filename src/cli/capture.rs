@@ -103,9 +103,7 @@ impl CommonArguments {
     /// Where the trace goes. Clap has seen to it that it is given.
     pub fn output(&self) -> Result<&Path> {
         let none = || Error::config("it is not said where the trace goes", "name it with -o");
-        let output = self.output.as_deref().ok_or_else(none)?;
-        check_output(output, Kind::Trace)?;
-        Ok(output)
+        self.output.as_deref().ok_or_else(none)
     }
 }
 
@@ -238,6 +236,7 @@ fn run_scene(
         path.into_iter().chain(arguments.texture.as_deref()).chain(choice.file()).collect();
     let outputs: Vec<&Path> = [output].into_iter().chain(common.json.path()).collect();
     check(&inputs, &outputs)?;
+    check_output(output, Kind::Trace)?;
     let file = OutputFile::create(output)?;
     let json = common.json.open()?;
     let loading = console.progress("loading the scene", "");

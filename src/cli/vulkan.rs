@@ -254,6 +254,7 @@ impl Begun {
         let output = if arguments.list { None } else { Some(common.output()?) };
         let outputs: Vec<&Path> = output.into_iter().chain(common.json.path()).collect();
         check(&[], &outputs)?;
+        output.map(|output| check_output(output, Kind::Trace)).transpose()?;
         let file = output.map(OutputFile::create).transpose()?;
         let json = common.json.open()?;
         let folder = match (&arguments.from, &arguments.keep) {
