@@ -17,6 +17,24 @@ pub(crate) trait Batch: Copy {
     fn alone(&self, n: u32) -> Self;
 }
 
+/// `Batch::alone` by the names of what a structure has of command buffers, waits and signals.
+macro_rules! alone {
+    ($buffers:ident, $n:ident, $waits:ident, $signals:ident) => {
+        fn alone(&self, n: u32) -> Self {
+            let mut one = *self;
+            one.$buffers = self.$buffers.wrapping_add(n as usize);
+            one.$n = 1;
+            if n > 0 {
+                one.$waits = 0;
+            }
+            if n + 1 < self.$n {
+                one.$signals = 0;
+            }
+            one
+        }
+    };
+}
+
 impl Batch for vk::SubmitInfo<'_> {
     fn command_buffers(&self) -> Vec<vk::CommandBuffer> {
         unsafe { slice(self.p_command_buffers, self.command_buffer_count).to_vec() }
@@ -44,18 +62,7 @@ impl Batch for vk::SubmitInfo<'_> {
         unsafe { find::<vk::DeviceGroupSubmitInfo<'_>>(self.p_next, group) }.is_none()
     }
 
-    fn alone(&self, n: u32) -> Self {
-        let mut one = *self;
-        one.p_command_buffers = self.p_command_buffers.wrapping_add(n as usize);
-        one.command_buffer_count = 1;
-        if n > 0 {
-            one.wait_semaphore_count = 0;
-        }
-        if n + 1 < self.command_buffer_count {
-            one.signal_semaphore_count = 0;
-        }
-        one
-    }
+    alone!(p_command_buffers, command_buffer_count, wait_semaphore_count, signal_semaphore_count);
 }
 
 impl Batch for vk::SubmitInfo2<'_> {
@@ -80,18 +87,12 @@ impl Batch for vk::SubmitInfo2<'_> {
         true
     }
 
-    fn alone(&self, n: u32) -> Self {
-        let mut one = *self;
-        one.p_command_buffer_infos = self.p_command_buffer_infos.wrapping_add(n as usize);
-        one.command_buffer_info_count = 1;
-        if n > 0 {
-            one.wait_semaphore_info_count = 0;
-        }
-        if n + 1 < self.command_buffer_info_count {
-            one.signal_semaphore_info_count = 0;
-        }
-        one
-    }
+    alone!(
+        p_command_buffer_infos,
+        command_buffer_info_count,
+        wait_semaphore_info_count,
+        signal_semaphore_info_count
+    );
 }
 
 impl Batch for vk::BindSparseInfo<'_> {

@@ -242,53 +242,39 @@ unsafe fn at<T: Copy>(first: *const T, at: u32, stride: u32) -> *const T {
     unsafe { first.byte_add(at as usize * stride as usize) }
 }
 
-pub(crate) unsafe extern "system" fn draw_multi(
-    buffer: vk::CommandBuffer,
-    n: u32,
-    draws: *const vk::MultiDrawInfoEXT,
-    instances: u32,
-    first_instance: u32,
-    stride: u32,
-) {
-    let Some(d) = (unsafe { device(buffer) }) else { return };
-    let name = "vkCmdDrawMultiEXT";
-    let next = d.table.draw_multi;
-    let apart = instanced(&d, buffer, n, instances);
-    if apart != Apart::Each {
-        let vertices = if n == 1 { unsafe { (*draws).vertex_count } } else { 0 };
-        before(&d, buffer, Command { name, instances, refused: apart.why(), vertices });
-        return next!(next, buffer, n, draws, instances, first_instance, stride);
-    }
-    for part in 0..n {
-        let one = unsafe { at(draws, part, stride) };
-        let vertices = unsafe { (*one).vertex_count };
-        before(&d, buffer, Command { name, vertices, instances, refused: "" });
-        let () = next!(next, buffer, 1, one, instances, first_instance, stride);
-    }
+/// Hooks of draws that are given several at once, `stride` bytes apart. What they end with differs.
+macro_rules! multi {
+    ($($hook:ident: $next:ident, $name:literal, $info:ty, $count:ident, ($($last:ident: $lt:ty),*);)*) => {$(
+        pub(crate) unsafe extern "system" fn $hook(
+            buffer: vk::CommandBuffer,
+            n: u32,
+            draws: *const $info,
+            instances: u32,
+            first_instance: u32,
+            stride: u32,
+            $($last: $lt),*
+        ) {
+            let Some(d) = (unsafe { device(buffer) }) else { return };
+            let name = $name;
+            let next = d.table.$next;
+            let apart = instanced(&d, buffer, n, instances);
+            if apart != Apart::Each {
+                let vertices = if n == 1 { unsafe { (*draws).$count } } else { 0 };
+                before(&d, buffer, Command { name, instances, refused: apart.why(), vertices });
+                return next!(next, buffer, n, draws, instances, first_instance, stride $(, $last)*);
+            }
+            for part in 0..n {
+                let one = unsafe { at(draws, part, stride) };
+                let vertices = unsafe { (*one).$count };
+                before(&d, buffer, Command { name, vertices, instances, refused: "" });
+                let () = next!(next, buffer, 1, one, instances, first_instance, stride $(, $last)*);
+            }
+        }
+    )*};
 }
 
-pub(crate) unsafe extern "system" fn draw_multi_indexed(
-    buffer: vk::CommandBuffer,
-    n: u32,
-    draws: *const vk::MultiDrawIndexedInfoEXT,
-    instances: u32,
-    first_instance: u32,
-    stride: u32,
-    offset: *const i32,
-) {
-    let Some(d) = (unsafe { device(buffer) }) else { return };
-    let name = "vkCmdDrawMultiIndexedEXT";
-    let next = d.table.draw_multi_indexed;
-    let apart = instanced(&d, buffer, n, instances);
-    if apart != Apart::Each {
-        let vertices = if n == 1 { unsafe { (*draws).index_count } } else { 0 };
-        before(&d, buffer, Command { name, instances, refused: apart.why(), vertices });
-        return next!(next, buffer, n, draws, instances, first_instance, stride, offset);
-    }
-    for part in 0..n {
-        let one = unsafe { at(draws, part, stride) };
-        let vertices = unsafe { (*one).index_count };
-        before(&d, buffer, Command { name, vertices, instances, refused: "" });
-        let () = next!(next, buffer, 1, one, instances, first_instance, stride, offset);
-    }
+multi! {
+    draw_multi: draw_multi, "vkCmdDrawMultiEXT", vk::MultiDrawInfoEXT, vertex_count, ();
+    draw_multi_indexed: draw_multi_indexed, "vkCmdDrawMultiIndexedEXT",
+        vk::MultiDrawIndexedInfoEXT, index_count, (offset: *const i32);
 }
