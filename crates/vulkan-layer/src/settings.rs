@@ -6,6 +6,28 @@ use std::path::PathBuf;
 /// The layer's name, by which the loader is told to use it.
 pub const LAYER: &str = "VK_LAYER_SCREENDOOR_capture";
 
+/// The manifest by which the loader finds the layer's library: JSON. `library` is as it stands there:
+/// without quotation marks and backslashes, relative to the manifest where it begins with a dot.
+pub fn manifest(library: &str) -> String {
+    format!(
+        r#"{{
+    "file_format_version": "1.1.2",
+    "layer": {{
+        "name": "{LAYER}",
+        "type": "GLOBAL",
+        "library_path": "{library}",
+        "api_version": "1.3.0",
+        "implementation_version": "1",
+        "description": "screendoor's capture of fragments",
+        "functions": {{
+            "vkNegotiateLoaderLayerInterfaceVersion": "vkNegotiateLoaderLayerInterfaceVersion"
+        }}
+    }}
+}}
+"#
+    )
+}
+
 /// What is captured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Span {

@@ -7,7 +7,7 @@ use std::process::{Child, Command, ExitStatus};
 use std::time::{Duration, Instant};
 
 use screendoor_trace::error::{Error, Result};
-use screendoor_vulkan_layer::settings::{LAYER, Settings};
+use screendoor_vulkan_layer::settings::{LAYER, Settings, manifest};
 
 use crate::logs::Watch;
 
@@ -113,26 +113,10 @@ impl Run {
         let linked = link(&self.library, &library);
         linked.map_err(|e| Error::io("write", &library, e))?;
         let name = library.file_name().unwrap_or_default().to_string_lossy();
-        let text = format!(
-            r#"{{
-    "file_format_version": "1.1.2",
-    "layer": {{
-        "name": "{LAYER}",
-        "type": "GLOBAL",
-        "library_path": "./{name}",
-        "api_version": "1.3.0",
-        "implementation_version": "1",
-        "description": "screendoor's capture of fragments",
-        "functions": {{
-            "vkNegotiateLoaderLayerInterfaceVersion": "vkNegotiateLoaderLayerInterfaceVersion"
-        }}
-    }}
-}}
-"#
-        );
-        let manifest = folder.join(MANIFEST);
-        fs::write(&manifest, text).map_err(|e| Error::io("write", &manifest, e))?;
-        Ok([manifest, library])
+        let text = manifest(&format!("./{name}"));
+        let place = folder.join(MANIFEST);
+        fs::write(&place, text).map_err(|e| Error::io("write", &place, e))?;
+        Ok([place, library])
     }
 
     /// What the program's environment has beside ours, as `get` gives that.

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use screendoor_vulkan_layer::log::{
     Draw, Entry, Event, Files, Image, Picture, Pipeline, RECORD_BYTES, Record, Submission, entries,
 };
-use screendoor_vulkan_layer::settings::{LAYER, Settings};
+use screendoor_vulkan_layer::settings::{LAYER, Settings, manifest};
 
 /// The folder of what is built beside this test.
 fn deps() -> PathBuf {
@@ -51,13 +51,7 @@ fn ran(case: &str, settings: Option<&Settings>, run: impl FnOnce(&mut Command) -
     command.arg(case).arg(&out).stdin(Stdio::null());
     if let Some(settings) = settings {
         let library = deps().join("libscreendoor_vulkan_layer.so");
-        let manifest = format!(
-            r#"{{"file_format_version": "1.1.2", "layer": {{"name": "{LAYER}", "type": "GLOBAL",
-            "library_path": "{}", "api_version": "1.3.239", "implementation_version": "1",
-            "description": "", "functions": {{"vkNegotiateLoaderLayerInterfaceVersion":
-            "vkNegotiateLoaderLayerInterfaceVersion"}}}}}}"#,
-            library.display()
-        );
+        let manifest = manifest(&library.display().to_string());
         std::fs::write(folder.join("layer.json"), manifest).unwrap();
         command.env("VK_ADD_LAYER_PATH", &folder).env("VK_INSTANCE_LAYERS", LAYER);
         command.envs(settings.variables());
