@@ -31,6 +31,19 @@ pub trait TiledDesign: Send + Sync {
     fn clear(&self, grid: TileGrid, tile: TileId) -> TileState;
     /// Draws fragments of one tile, in this order; rows that cover nothing are none.
     fn draw(&self, pass: u32, state: &mut TileState, fragments: &Block, listener: Listener<'_>);
+    /// Draws all that `blocks` gives, of one tile, in this order: what an engine gains by
+    /// seeing many of a tile's fragments at once is its own matter.
+    fn draw_blocks(
+        &self,
+        pass: u32,
+        state: &mut TileState,
+        blocks: &mut dyn Blocks,
+        mut listener: Listener<'_>,
+    ) {
+        while let Some(block) = blocks.next() {
+            self.draw(pass, state, block, listener.again());
+        }
+    }
     /// Ends a pass for a tile.
     fn end_pass(
         &self,
@@ -44,6 +57,14 @@ pub trait TiledDesign: Send + Sync {
     fn resolve(&self, grid: TileGrid, tile: TileId, state: &TileState) -> TilePixels;
     /// What a tile's pixel holds; `within` is its place in the tile.
     fn contents(&self, state: &TileState, within: usize) -> Contents;
+}
+
+/// A tile's fragments, a block at a time.
+pub trait Blocks {
+    /// How many rows are left, at most.
+    fn rows(&self) -> usize;
+    /// The next block; `None` at the end.
+    fn next(&mut self) -> Option<&Block>;
 }
 
 /// Who is told what happens.
@@ -143,6 +164,17 @@ pub(crate) fn sites(grid: TileGrid, tile: TileId) -> impl Iterator<Item = Site> 
         // Beyond a frame of full size this wraps; such pixels are never drawn to.
         Site { x: x as u16, y: y as u16 }
     })
+}
+
+impl Listener<'_> {
+    /// The same listener, lent for a while.
+    pub fn again(&mut self) -> Listener<'_> {
+        match self {
+            Listener::Nobody => Listener::Nobody,
+            Listener::Counts(counts) => Listener::Counts(counts),
+            Listener::Record(record) => Listener::Record(record),
+        }
+    }
 }
 
 impl Listen for Listener<'_> {
