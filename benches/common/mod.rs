@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use screendoor::capture::{Capture, CaptureOptions};
 use screendoor::param::Options;
-use screendoor::rop::{EventCounts, Frame, Implementation, Listener, TileState, TiledDesign};
+use screendoor::rop::{BlockList, EventCounts, Frame, Implementation, Listener, TileState, TiledDesign};
 use screendoor::tile::TileId;
 use screendoor::trace::{Block, Compression, SampleMask, Trace, TraceWriter, WriteOptions};
 
@@ -99,17 +99,14 @@ pub fn draw(
     let mut time = start.elapsed();
     let mut near = Block::default();
     for pass in 0..engine.passes() {
-        for block in blocks {
-            near.clone_from(block);
-            let near = black_box(&near);
-            let told = match work {
-                Work::Count => Listener::Counts(&mut events),
-                Work::Draw | Work::Picture => Listener::Nobody,
-            };
-            let start = Instant::now();
-            engine.draw(pass, &mut state, near, told);
-            time += start.elapsed();
-        }
+        let near = black_box(blocks.clone());
+        let told = match work {
+            Work::Count => Listener::Counts(&mut events),
+            Work::Draw | Work::Picture => Listener::Nobody,
+        };
+        let start = Instant::now();
+        engine.draw_blocks(pass, &mut state, &mut BlockList::new(&near), told);
+        time += start.elapsed();
         let start = Instant::now();
         engine.end_pass(pass, frame.grid, *tile, &mut state, Listener::Nobody);
         time += start.elapsed();

@@ -3,7 +3,7 @@
 use screendoor::design::{Configured, DESIGNS};
 use screendoor::param::Options;
 use screendoor::random::Stream;
-use screendoor::rop::{EventCounts, Frame, Implementation, Listener, Site};
+use screendoor::rop::{BlockList, EventCounts, Frame, Implementation, Listener, Site};
 use screendoor::tile::{TileGrid, TileId};
 use screendoor::trace::{Block, DepthPlane, Fragment, Header, SampleMask, Unorm32};
 
@@ -76,6 +76,7 @@ fn run(
     frame: &Frame,
     implementation: Implementation,
     fragments: &[Fragment],
+    at_once: bool,
 ) -> (Vec<screendoor::rop::Contents>, EventCounts, Vec<[u64; 3]>) {
     let engine = design.build(frame, implementation).unwrap();
     let (grid, tile) = (frame.grid, TileId(0));
@@ -86,13 +87,22 @@ fn run(
     let mut uncounted = engine.clear(grid, tile);
     for pass in 0..engine.passes() {
         // In two parts, as windows cut them.
-        for part in fragments.chunks(fragments.len() / 2 + 1).flat_map(Block::all_of) {
-            engine.draw(pass, &mut counted, &part, Listener::Counts(&mut counts));
-            engine.draw(pass, &mut uncounted, &part, Listener::Nobody);
+        for part in fragments.chunks(fragments.len() / 2 + 1).map(Block::all_of) {
+            if at_once {
+                let blocks = || BlockList::new(&part);
+                let told = Listener::Counts(&mut counts);
+                engine.draw_blocks(pass, &mut counted, &mut blocks(), told);
+                engine.draw_blocks(pass, &mut uncounted, &mut blocks(), Listener::Nobody);
+                continue;
+            }
+            for block in &part {
+                engine.draw(pass, &mut counted, block, Listener::Counts(&mut counts));
+                engine.draw(pass, &mut uncounted, block, Listener::Nobody);
+            }
         }
         engine.end_pass(pass, grid, tile, &mut counted, Listener::Counts(&mut counts));
         engine.end_pass(pass, grid, tile, &mut uncounted, Listener::Nobody);
-        for within in 0..5 {
+        for within in (0..5).chain([20, 255]) {
             held.push(engine.contents(&counted, within));
             held.push(engine.contents(&uncounted, within));
         }
@@ -102,19 +112,47 @@ fn run(
     (held, counts, bits.collect())
 }
 
+/// Fragments all over a tile, so many that engines look at many at once; few or none at the
+/// near end of the depth range, where they would not.
+fn throng(header: &Header, seed: u32) -> Vec<Fragment> {
+    let mut random = Stream::new([0x7412, seed]);
+    // From a few pixels to all; lists of the same length and of very different ones.
+    let (side, skew) = (1 + random.below(16), random.below(2) == 1);
+    let count = 1300 + random.below(3000) as usize;
+    let spread = |mut f: Fragment| {
+        let mut place = || match skew && random.below(3) > 0 {
+            true => 0,
+            false => random.below(side) as u16,
+        };
+        (f.x, f.y) = (place(), place());
+        let near = random.below(20_000) == 0;
+        if !near && f.depth.z.0 < 1 << 30 {
+            f.depth.z.0 |= 1 << 30;
+            (f.depth.dzdx, f.depth.dzdy) = (f.depth.dzdx >> 6, f.depth.dzdy >> 6);
+        }
+        // Steep ones at times.
+        if !near && random.below(50) > 0 {
+            (f.depth.dzdx, f.depth.dzdy) = (f.depth.dzdx >> 8, f.depth.dzdy >> 8);
+        }
+        f
+    };
+    crowd(header, count, seed).into_iter().map(spread).collect()
+}
+
 /// Holds all engines of all variants of a design against its plain text.
-fn check(name: &str, samples: u32, cases: u32) {
+fn check(name: &str, samples: u32, cases: u32, at_once: bool) {
     let header = Header { background: [0.1, 0.2, 0.3], ..header(40, 40, samples) };
     let empty = trace(&header, &[]);
     let entry = DESIGNS.iter().find(|entry| entry.info.name == name).unwrap();
     for (i, design) in variants(entry).into_iter().enumerate() {
         for case in 0..cases {
             let seed = case * 1000 + i as u32;
-            let fragments = crowd(&header, 60, seed);
+            let fragments =
+                if at_once { throng(&header, seed) } else { crowd(&header, 60, seed) };
             let frame = design.frame(&empty, samples, seed).unwrap();
-            let expected = run(&design, &frame, Implementation::Reference, &fragments);
+            let expected = run(&design, &frame, Implementation::Reference, &fragments, at_once);
             for implementation in engines() {
-                let found = run(&design, &frame, implementation, &fragments);
+                let found = run(&design, &frame, implementation, &fragments, at_once);
                 let label = design.label();
                 assert_eq!(found.0, expected.0, "{label} {implementation:?} {samples}: state");
                 assert_eq!(found.1, expected.1, "{label} {implementation:?} {samples}: events");
@@ -126,7 +164,10 @@ fn check(name: &str, samples: u32, cases: u32) {
 
 fn check_counts(name: &str) {
     for samples in [1, 2, 4, 8, 16, 32, 64] {
-        check(name, samples, 6);
+        check(name, samples, 6, false);
+    }
+    for samples in [1, 2, 4, 8, 16] {
+        check(name, samples, 2, true);
     }
 }
 

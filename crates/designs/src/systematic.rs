@@ -12,11 +12,12 @@
 //! two samples of each pair exchange their places in the row at random (`exchange`). Elsewhere
 //! that only blurs what the row keeps even.
 
-use fearless_simd::{Level, Simd};
+use fearless_simd::prelude::*;
+use fearless_simd::{Level, Simd, u32x16};
 
 use screendoor_rop::fast::{
-    Base, Count, FastEngine, FastReferences, FastTracked, Lanes, Limit, Loaded, Numbered,
-    Parameterised, Published, Tally, Width, below, is_published, teeth,
+    Base, Count, Counted, FastEngine, FastReferences, FastTracked, Lanes, Limit, Loaded, Numbered,
+    NumberedAbreast, Parameterised, Published, Tally, Width, below, is_published, teeth,
 };
 use screendoor_rop::shader;
 use screendoor_rop::stochastic::comb::{among, comb, exchanged};
@@ -371,6 +372,44 @@ impl<const N: usize> FastReferences<N> for Summed {
         *kept = (start.wrapping_add(threshold.wrapping_mul(count)), begun || count > 0);
         let exchanges = exchanges(Exchange::Half, &samples, tally);
         evenly(simd, loaded, (start, exchanges), limit)
+    }
+
+    const KEEPS: bool = true;
+
+    fn word((phase, _): (u32, bool)) -> u32 {
+        phase
+    }
+    fn of_word(phase: u32, begun: bool) -> (u32, bool) {
+        (phase, begun)
+    }
+
+    fn goes_abreast(&self) -> bool {
+        // So few samples exchange no places.
+        N as u32 <= FEW
+    }
+
+    #[inline(always)]
+    fn passing_abreast<S: Simd, P: Probe>(
+        &self,
+        simd: S,
+        samples: &NumberedAbreast<S>,
+        phase: &mut u32x16<S>,
+        counted: &mut Counted<S, P>,
+    ) -> u32x16<S> {
+        let NumberedAbreast { fresh, count, .. } = *samples;
+        let word = |word: u32| u32x16::splat(simd, word);
+        let some = count.simd_gt(word(0));
+        counted.hashed((fresh & some).select(word(1), word(0)));
+        let mut tooth = fresh.select(samples.first_lk2011(simd), *phase);
+        *phase = tooth + samples.threshold() * count;
+        samples.passing::<N>(
+            simd,
+            #[inline(always)]
+            |_| {
+                tooth = tooth + samples.threshold();
+                tooth
+            },
+        )
     }
 }
 

@@ -40,7 +40,7 @@ pub use contract::promise::Promise;
 pub use contract::promises::{OpaquePromise, OrderPromise, Promises};
 pub use contract::samples::{SampleList, Samples, in_sample_order, sort_by_stored_depth};
 pub use contract::shader::Shader;
-pub use contract::tiled::{Blocks, Listener, TileState, TiledDesign};
+pub use contract::tiled::{BlockList, Blocks, Listener, TileState, TiledDesign};
 pub use contract::words::{
     Constant, Declaration, Field, OnDevice, PixelWords, Ranks, TILE, TileWords,
 };

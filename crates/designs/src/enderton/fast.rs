@@ -4,7 +4,7 @@ use fearless_simd::Simd;
 
 use crate::enderton::{Among, EndertonSampler, MaskRule, Words};
 use screendoor_rop::fast::{
-    FastSampler, Lanes, Loaded, Offered, Tally, below, picked, ranks_of_distinct,
+    FastSampler, Lanes, Loaded, Offered, OneByOne, Tally, below, picked, ranks_of_distinct,
 };
 use screendoor_rop::{Probe, Round, Samples};
 use screendoor_trace::random::{GOLDEN, MIX, hash};
@@ -35,6 +35,7 @@ impl<const N: usize> FastEnderton<N> {
 impl<const N: usize> FastSampler<N> for FastEnderton<N> {
     type Plain = EndertonSampler<N>;
     type State = ();
+    type Abreast = OneByOne<()>;
 
     fn clear(&self, _: TileGrid, _: TileId) -> Vec<()> {
         vec![(); TILE_PIXELS]

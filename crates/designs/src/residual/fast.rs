@@ -10,7 +10,7 @@ use crate::residual::errors::{
 };
 use crate::residual::{ResidualSampler, Residue};
 use screendoor_rop::fast::{
-    self, Count, FastSampler, Lanes, Loaded, Offered, Tally, below, in_sample_order, picked, ranks,
+    self, Count, FastSampler, Lanes, Loaded, Offered, OneByOne, Tally, below, in_sample_order, picked, ranks,
     teeth,
 };
 use screendoor_rop::stochastic::comb::exchanges;
@@ -65,6 +65,7 @@ where
 {
     type Plain = ResidualSampler<N>;
     type State = Kept<<Count<N> as fast::Width>::Row>;
+    type Abreast = OneByOne<Self::State>;
 
     fn clear(&self, grid: TileGrid, tile: TileId) -> Vec<Self::State> {
         let cleared = |index| Kept {

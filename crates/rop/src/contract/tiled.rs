@@ -44,6 +44,18 @@ pub trait TiledDesign: Send + Sync {
             self.draw(pass, state, block, listener.again());
         }
     }
+    /// The colours of a tile of which `blocks` are all fragments, of an engine that finds them
+    /// without a state in memory: as of a cleared tile that they are drawn to. `None`, and no
+    /// block is taken, where it does not.
+    fn picture(
+        &self,
+        _grid: TileGrid,
+        _tile: TileId,
+        _blocks: &mut dyn Blocks,
+        _listener: Listener<'_>,
+    ) -> Option<TilePixels> {
+        None
+    }
     /// Ends a pass for a tile.
     fn end_pass(
         &self,
@@ -65,6 +77,26 @@ pub trait Blocks {
     fn rows(&self) -> usize;
     /// The next block; `None` at the end.
     fn next(&mut self) -> Option<&Block>;
+}
+
+/// Blocks that are there already.
+#[derive(Clone, Debug)]
+pub struct BlockList<'a>(std::slice::Iter<'a, Block>);
+
+impl<'a> BlockList<'a> {
+    /// These, in their order.
+    pub fn new(blocks: &'a [Block]) -> Self {
+        BlockList(blocks.iter())
+    }
+}
+
+impl Blocks for BlockList<'_> {
+    fn rows(&self) -> usize {
+        self.0.as_slice().iter().map(Block::rows).sum()
+    }
+    fn next(&mut self) -> Option<&Block> {
+        self.0.next()
+    }
 }
 
 /// Who is told what happens.

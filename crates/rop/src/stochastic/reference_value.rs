@@ -100,8 +100,11 @@ impl ReferenceKey {
 /// keeps 0 from being mapped to itself.
 #[inline]
 pub const fn prehash(n: u32) -> u32 {
-    mix(n ^ 0xe6fe_3beb)
+    mix(n ^ PREHASHED)
 }
+
+/// The constant of [`prehash`].
+pub(crate) const PREHASHED: u32 = 0xe6fe_3beb;
 
 /// LK figure 4, lines 1 and 2: the reversed bits of the place in the sequence, and
 /// the seed by which figure 4 moves it on: the surface.

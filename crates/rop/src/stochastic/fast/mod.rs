@@ -8,6 +8,7 @@
 //! range, very steep planes) and what is done once a pixel (the resolve of several
 //! passes) goes through it.
 
+mod abreast;
 mod comb;
 mod engine;
 mod kernel;
@@ -23,6 +24,10 @@ mod tracked;
 mod twin;
 
 pub use crate::lanes::{Count, Lanes, Width, levels};
+pub use abreast::{
+    Abreast, Counted, Met, NumberedAbreast, OneByOne, Ranks, Source, bit, gather, mixed, right_by,
+    words_of,
+};
 pub use comb::teeth;
 pub use limit::{Limit, below};
 pub use rank::{in_sample_order, picked, ranks, ranks_of_any, ranks_of_distinct};

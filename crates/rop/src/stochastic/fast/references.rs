@@ -1,7 +1,9 @@
 //! Reference values in lanes, in the order of the samples' numbers.
 
+use crate::stochastic::fast::abreast::{Counted, NumberedAbreast, from_first, nested};
 use crate::stochastic::fast::limit::{Limit, below};
-use fearless_simd::Simd;
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, u32x16};
 
 use crate::contract::event::Probe;
 use crate::lanes::Lanes;
@@ -34,8 +36,8 @@ pub struct Numbered<'a> {
 /// move the values.
 #[derive(Clone, Copy, Default, Debug)]
 pub struct Base {
-    reversed: u32,
-    moved: u32,
+    pub(super) reversed: u32,
+    pub(super) moved: u32,
 }
 
 impl Base {
@@ -86,6 +88,34 @@ pub trait FastReferences<const N: usize>: Copy + Send + Sync + 'static {
         samples: Numbered<'_>,
         tally: &mut Tally<'_, P>,
     ) -> u64;
+
+    /// Whether a word of it is kept from fragment to fragment, where pixels are in lanes.
+    const KEEPS: bool = false;
+
+    /// That word.
+    fn word(_kept: Self::Kept) -> u32 {
+        0
+    }
+    /// What is kept, of that word and whether a sample of the surface has been numbered.
+    fn of_word(_word: u32, _begun: bool) -> Self::Kept {
+        Self::Kept::default()
+    }
+
+    /// Whether there is [`FastReferences::passing_abreast`].
+    fn goes_abreast(&self) -> bool {
+        false
+    }
+
+    /// As [`FastReferences::passing`], with pixels in lanes; `word` is what is kept.
+    fn passing_abreast<S: Simd, P: Probe>(
+        &self,
+        _simd: S,
+        _samples: &NumberedAbreast<S>,
+        _word: &mut u32x16<S>,
+        _counted: &mut Counted<S, P>,
+    ) -> u32x16<S> {
+        unreachable!("it does not go abreast")
+    }
 }
 
 /// Figure 4 of the publication, known when the kernel is compiled.
@@ -140,6 +170,63 @@ impl<H: HashBy, const N: usize> FastReferences<N> for H {
             return ahead(simd, loaded, &samples);
         }
         hashed::<S, L, N>(self.reference(), simd, loaded, &samples)
+    }
+
+    fn goes_abreast(&self) -> bool {
+        // The others are no few multiplications.
+        !matches!(self.reference(), Reference::Owen | Reference::Sobol | Reference::White)
+    }
+
+    #[inline(always)]
+    fn passing_abreast<S: Simd, P: Probe>(
+        &self,
+        simd: S,
+        samples: &NumberedAbreast<S>,
+        _: &mut u32x16<S>,
+        counted: &mut Counted<S, P>,
+    ) -> u32x16<S> {
+        counted.hashed(samples.count);
+        let hits = all_abreast::<S, N>(self.reference(), simd, samples);
+        from_first::<S, N>(simd, hits, samples.first)
+    }
+}
+
+/// Which numbers of surfaces pass.
+#[inline(always)]
+fn all_abreast<S: Simd, const N: usize>(
+    reference: Reference,
+    simd: S,
+    samples: &NumberedAbreast<S>,
+) -> u32x16<S> {
+    let NumberedAbreast { reversed, moved, limits, .. } = samples;
+    let x = *reversed + *moved;
+    let place = |n: u32| *reversed | u32x16::splat(simd, n.reverse_bits());
+    let word = |word: u32| u32x16::splat(simd, word);
+    match reference {
+        Reference::Lk2011 => nested::<S, N, 4>(simd, x, limits),
+        Reference::Lk2011Rounds1 => nested::<S, N, 1>(simd, x, limits),
+        Reference::Lk2011Rounds2 => nested::<S, N, 2>(simd, x, limits),
+        Reference::Lk2011Rounds3 => nested::<S, N, 3>(simd, x, limits),
+        Reference::VegdahlV2 => samples.passing::<N>(
+            simd,
+            #[inline(always)]
+            |n| {
+                let x = ((place(n) + *moved) ^ word(0xdc96_7795)) * word(0x97b7_54b7);
+                (x ^ word(0x8663_50b1)) * word(0x9e37_79cd)
+            },
+        ),
+        Reference::Vegdahl => samples.passing::<N>(
+            simd,
+            #[inline(always)]
+            |n| {
+                let x = place(n);
+                let x = (x ^ (x * word(0x3d20_adea))) + *moved;
+                let x = x * ((*moved >> 16) | word(1));
+                let x = x ^ (x * word(0x0552_6c56));
+                x ^ (x * word(0x53a2_2864))
+            },
+        ),
+        _ => nested::<S, N, 0>(simd, x, limits),
     }
 }
 

@@ -9,6 +9,7 @@ use fearless_simd::Simd;
 use screendoor_trace::tile::{TILE_PIXELS, TileGrid, TileId};
 use screendoor_trace::trace::{Block, DepthPlane, Fragment, Unorm32};
 
+use crate::stochastic::fast::abreast::Abreast;
 use crate::stochastic::fast::limit::Limit;
 use crate::stochastic::fast::tally::Tally;
 
@@ -84,6 +85,13 @@ pub trait FastSampler<const N: usize>: Send + Sync + 'static {
     type Plain: Sampler<N>;
     /// What it keeps of a pixel beside the multisample buffer.
     type State: Copy + Send + 'static;
+    /// The same with pixels in lanes.
+    type Abreast: Abreast<N, Kept = Self::State>;
+
+    /// That, where there is one.
+    fn abreast(&self) -> Option<&Self::Abreast> {
+        None
+    }
 
     /// The states of a tile's pixels before the first fragment.
     fn clear(&self, grid: TileGrid, tile: TileId) -> Vec<Self::State>;

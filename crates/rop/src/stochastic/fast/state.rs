@@ -33,6 +33,9 @@ where
     pub(super) sums: Vec<Option<Box<MethodsSums<N>>>>,
     /// The round for which the states were made ready.
     pub(super) entered: Option<Round>,
+    /// Whether a fragment has come to the near end of the depth range: from then on the tile
+    /// is drawn with samples in lanes, which know of that end.
+    pub(super) near: bool,
     /// Empty where opaque fragments are drawn like all others.
     pub(super) opaque: Vec<Option<Box<Samples<N>>>>,
 }
@@ -74,6 +77,7 @@ where
             states,
             sums: sums.unwrap_or_default(),
             entered: None,
+            near: false,
             opaque: if opaque { vec![None; TILE_PIXELS] } else { Vec::new() },
         }
     }

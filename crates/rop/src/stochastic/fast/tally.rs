@@ -17,11 +17,11 @@ pub struct Tally<'a, P> {
     pub(super) passed: u64,
     pub(super) written: u64,
     pub(super) tracked: u64,
-    surfaces: u64,
-    compared: u64,
-    multiplied: u64,
-    colours_read: u64,
-    hashes: u64,
+    pub(super) surfaces: u64,
+    pub(super) compared: u64,
+    pub(super) multiplied: u64,
+    pub(super) colours_read: u64,
+    pub(super) hashes: u64,
     /// Apart from the others: written where a number says, it must lie in memory.
     lengths: &'a mut Lengths,
     probe: PhantomData<P>,
@@ -92,6 +92,11 @@ impl<'a, P: Probe> Tally<'a, P> {
         if P::LISTENS {
             self.lengths[samples as usize % self.lengths.len()] += 1;
         }
+    }
+
+    /// So many sorts of so many samples.
+    pub(super) fn sorts(&mut self, samples: usize, sorts: u64) {
+        self.lengths[samples] += sorts;
     }
 
     /// So many hashes were evaluated.

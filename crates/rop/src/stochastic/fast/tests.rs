@@ -15,7 +15,7 @@ use crate::tracked::{
 };
 use crate::{colour, depth_bits};
 
-const PARAMS: &[Param] = &[
+pub(super) const PARAMS: &[Param] = &[
     SORT.param,
     COMPACT.param,
     SURFACES.param,
@@ -62,12 +62,9 @@ fn held(engine: &dyn TiledDesign, samples: u32) -> Vec<Contents> {
     list
 }
 
-/// A wrong bit in any lane, of a depth or of a choice, is told from the plain text.
-fn check<const N: usize>()
-where
-    Count<N>: Width,
-{
-    let frame = Frame {
+/// A frame of a tile, its samples in rows.
+pub(super) fn frame<const N: usize>() -> Frame {
+    Frame {
         grid: TileGrid::new(16, 16),
         positions: (0..N as i32).map(|s| [(s % 8 * 2 - 8) as i8, (s / 8 * 2 - 8) as i8]).collect(),
         background: [0.5; 3],
@@ -78,7 +75,15 @@ where
         opaque: true,
         primitive_depths: None,
         columns: Default::default(),
-    };
+    }
+}
+
+/// A wrong bit in any lane, of a depth or of a choice, is told from the plain text.
+fn check<const N: usize>()
+where
+    Count<N>: Width,
+{
+    let frame = frame::<N>();
     // As `lk` has it.
     let values = Values::resolve("lk", PARAMS, &[]).unwrap();
     let plain = || {

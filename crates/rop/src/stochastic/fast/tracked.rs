@@ -25,11 +25,11 @@ use screendoor_trace::trace::SampleMask;
 /// The parameters that the kernel asks for with every fragment.
 #[derive(Clone, Copy, Debug)]
 pub struct Switches {
-    sort: bool,
-    compact: bool,
-    surfaces: SurfaceRule,
+    pub(super) sort: bool,
+    pub(super) compact: bool,
+    pub(super) surfaces: SurfaceRule,
     track: Tracked,
-    prehash: bool,
+    pub(super) prehash: bool,
     depth_bits: u32,
 }
 
@@ -37,6 +37,8 @@ pub struct Switches {
 pub trait Rules: Copy + Send + Sync + 'static {
     /// What a pixel keeps beside the published state.
     type More: Copy + Default + Send + 'static;
+    /// Whether that is anything.
+    const HAS_MORE: bool;
 
     /// The switches.
     fn switches(&self) -> Switches;
@@ -54,6 +56,7 @@ pub struct Published;
 
 impl Rules for Published {
     type More = ();
+    const HAS_MORE: bool = false;
 
     #[inline(always)]
     fn switches(&self) -> Switches {
@@ -84,6 +87,7 @@ pub struct Parameterised(Switches);
 
 impl Rules for Parameterised {
     type More = (u32, Option<u32>);
+    const HAS_MORE: bool = true;
 
     #[inline(always)]
     fn switches(&self) -> Switches {
@@ -133,21 +137,21 @@ impl Parameterised {
 /// Figure 7 with any reference values, for pixels of `N` samples.
 #[derive(Clone, Debug)]
 pub struct FastTracked<R, F, const N: usize> {
-    rules: R,
-    references: F,
+    pub(super) rules: R,
+    pub(super) references: F,
     pixel_order: PixelOrder,
 }
 
 /// What figure 7 keeps of a pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct Track<K, M> {
-    covered: u64,
-    surface: u32,
+    pub(super) covered: u64,
+    pub(super) surface: u32,
     /// What the surface's reference values are made of, but for the number, in this round.
-    base: Base,
-    pixel: PixelIndex,
-    kept: K,
-    more: M,
+    pub(super) base: Base,
+    pub(super) pixel: PixelIndex,
+    pub(super) kept: K,
+    pub(super) more: M,
 }
 
 impl<R: Rules, F: FastReferences<N>, const N: usize> FastTracked<R, F, N> {
@@ -160,6 +164,11 @@ impl<R: Rules, F: FastReferences<N>, const N: usize> FastTracked<R, F, N> {
 impl<R: Rules, F: FastReferences<N>, const N: usize> FastSampler<N> for FastTracked<R, F, N> {
     type Plain = TrackedSampler<F::Plain, N>;
     type State = Track<F::Kept, R::More>;
+    type Abreast = Self;
+
+    fn abreast(&self) -> Option<&Self> {
+        self.references.goes_abreast().then_some(self)
+    }
 
     fn clear(&self, grid: TileGrid, tile: TileId) -> Vec<Self::State> {
         let cleared = |pixel| Track {
@@ -314,7 +323,7 @@ impl<R: Rules, F, const N: usize> FastTracked<R, F, N> {
     /// Whether all covered samples are tracked, so that numbered ones are counted
     /// apart.
     #[inline(always)]
-    fn counts(&self) -> bool {
+    pub(super) fn counts(&self) -> bool {
         let switches = self.rules.switches();
         switches.compact && switches.track == Tracked::Covered
     }

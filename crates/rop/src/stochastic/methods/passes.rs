@@ -54,7 +54,7 @@ impl<S: Sampler<N>, const N: usize> Methods<S, N> {
     }
 
     /// Whether anything is summed over rounds or passes.
-    pub(super) fn has_sums(&self) -> bool {
+    pub(crate) fn has_sums(&self) -> bool {
         self.method != Method::Basic || self.rounds > 1
     }
 
