@@ -1,0 +1,273 @@
+//! What one thread has sorted: chunks of a tile's rows, bump-allocated in slabs.
+
+use std::ops::Range;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use fearless_simd::Level;
+
+use crate::tile::{TileGrid, TileId, TileMap};
+use crate::trace::batch::Batch;
+use crate::trace::bins::Tiles;
+use crate::trace::bins::column::{Copies, Rows, STRETCH};
+use crate::trace::bins::columns::{BinnedColumns, STEP, Within};
+use crate::trace::bins::runs::for_each_run;
+
+/// Rows of a tile's first chunk; each that follows holds twice as many, so that little is
+/// wasted on tiles with few fragments and none of the others is in many pieces.
+const FIRST_CHUNK: u32 = 32;
+/// Rows of a chunk, at most.
+pub(super) const LAST_CHUNK: u32 = 512;
+
+/// A part of the rows, sorted into tiles. It is filled again and again: memory that has been
+/// touched is cheaper than fresh memory.
+#[derive(Debug)]
+pub(super) struct Part {
+    /// None before the first batch.
+    columns: Option<BinnedColumns>,
+    /// The binary logarithm of a slab's rows, the slabs there are, and the rows given away,
+    /// numbered through all of them.
+    shift: u32,
+    slabs: usize,
+    used: u64,
+    lists: TileMap<List>,
+    chunks: Vec<Chunk>,
+    copies: Copies,
+    within: Box<Within>,
+}
+
+/// A tile's rows.
+#[derive(Clone, Debug)]
+pub(super) struct List {
+    pub rows: u64,
+    /// The first and the last of its chunks.
+    first: u32,
+    last: u32,
+    /// The last chunk's free rows.
+    at: u32,
+    end: u32,
+}
+
+/// Rows that lie one after the other.
+#[derive(Clone, Copy, Debug)]
+struct Chunk {
+    start: u32,
+    /// How many there is room for.
+    room: u32,
+    /// The tile's next one, or itself.
+    next: u32,
+}
+
+/// Slabs that may be added to all parts together.
+#[derive(Debug)]
+pub(super) struct Budget(pub AtomicUsize);
+
+impl Budget {
+    fn take(&self) -> bool {
+        self.0.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| n.checked_sub(1)).is_ok()
+    }
+}
+
+impl Part {
+    /// An empty one, whose slabs hold 2^`shift` rows.
+    pub(super) fn new(grid: TileGrid, shift: u32) -> Self {
+        Part {
+            columns: None,
+            shift,
+            slabs: 0,
+            used: 0,
+            lists: TileMap::new(grid),
+            chunks: Vec::new(),
+            copies: Copies::new(shift),
+            within: Box::new([0; STEP + STRETCH]),
+        }
+    }
+
+    /// Removes all rows; their memory is kept.
+    pub(super) fn clear(&mut self) {
+        self.used = 0;
+        self.lists.clear();
+        self.chunks.clear();
+    }
+
+    /// How many slabs there are.
+    pub(super) fn slabs(&self) -> usize {
+        self.slabs
+    }
+
+    /// Bytes that it takes.
+    pub(super) fn bytes(&self) -> u64 {
+        let row = self.columns.as_ref().map_or(0, BinnedColumns::bytes);
+        let lists = self.lists.touched().len() * size_of::<(TileId, List)>();
+        ((self.slabs * row) as u64 * (1 << self.shift))
+            + (lists + self.chunks.capacity() * size_of::<Chunk>()) as u64
+    }
+
+    /// The tiles that it has rows of, as they were met.
+    pub(super) fn lists(&self) -> &[(TileId, List)] {
+        self.lists.touched()
+    }
+
+    /// A tile's rows, in order.
+    pub(super) fn chunks(&self, tile: TileId) -> Option<Chunks<'_>> {
+        let list = self.lists.get(tile)?;
+        Some(Chunks { part: self, next: Some(list.first), last: list.last, at: list.at })
+    }
+
+    /// The columns.
+    pub(super) fn columns(&self) -> &BinnedColumns {
+        self.columns.as_ref().expect("it has rows")
+    }
+
+    /// Sorts those rows of `batch` that belong to `tiles`. Tells the row before which it
+    /// stopped: there was no more room, and `budget` gave none.
+    pub(super) fn sort(
+        &mut self,
+        level: Level,
+        batch: &Batch,
+        rows: Range<usize>,
+        tiles: &Tiles,
+        budget: &Budget,
+    ) -> Option<usize> {
+        self.columns.get_or_insert_with(|| BinnedColumns::like(batch));
+        for first in rows.clone().step_by(STEP) {
+            let some = first..rows.end.min(first + STEP);
+            let full = self.find(level, batch, some.clone(), tiles, budget);
+            let columns = self.columns.as_mut().expect("it is there");
+            columns.copy(level, batch, first, some.len(), &self.copies, &mut self.within);
+            if full.is_some() {
+                return full;
+            }
+        }
+        None
+    }
+
+    /// Finds where rows go.
+    fn find(
+        &mut self,
+        level: Level,
+        batch: &Batch,
+        rows: Range<usize>,
+        tiles: &Tiles,
+        budget: &Budget,
+    ) -> Option<usize> {
+        self.copies.clear();
+        let (grid, len) = (self.lists.grid(), batch.len());
+        let mut full = None;
+        for_each_run(level, batch, rows, |(x, y), run| {
+            let tile = grid.tile(x, y);
+            if full.is_some() {
+                return;
+            }
+            match tiles {
+                Tiles::All => full = self.add(tile, run, len, budget),
+                Tiles::Range(some) if some.contains(&tile.0) => {
+                    full = self.add(tile, run, len, budget);
+                }
+                Tiles::Part(only, within) if tile == *only => {
+                    let held = |row: &usize| {
+                        let (x, y) = batch.pixel(*row);
+                        within.contains(&TileGrid::within(x, y))
+                    };
+                    let mut held = run.filter(held);
+                    full = held.find_map(|row| self.add(tile, row..row + 1, len, budget));
+                }
+                _ => {}
+            }
+        });
+        full
+    }
+
+    /// Finds where rows of one tile go, of a batch of `len`.
+    #[inline]
+    fn add(
+        &mut self,
+        tile: TileId,
+        rows: Range<usize>,
+        len: usize,
+        budget: &Budget,
+    ) -> Option<usize> {
+        let slot = match self.lists.slot(tile) {
+            Some(slot) => slot,
+            None => {
+                let Some(chunk) = self.chunk(FIRST_CHUNK, budget) else { return Some(rows.start) };
+                self.lists.touch(tile, || {
+                    let Chunk { start, room, .. } = self.chunks[chunk as usize];
+                    List { rows: 0, first: chunk, last: chunk, at: start, end: start + room }
+                })
+            }
+        };
+        let mut from = rows.start;
+        while from < rows.end {
+            let list = &mut self.lists.touched_mut()[slot].1;
+            if list.at == list.end {
+                let last = list.last;
+                let twice = (2 * self.chunks[last as usize].room).min(LAST_CHUNK);
+                let Some(chunk) = self.chunk(twice, budget) else { return Some(from) };
+                self.chunks[last as usize].next = chunk;
+                let Chunk { start, room, .. } = self.chunks[chunk as usize];
+                let list = &mut self.lists.touched_mut()[slot].1;
+                (list.last, list.at, list.end) = (chunk, start, start + room);
+                continue;
+            }
+            let room = list.end - list.at;
+            let count = (rows.end - from).min(STRETCH).min(room as usize);
+            self.copies.add(from, len, list.at, room, count);
+            list.at += count as u32;
+            list.rows += count as u64;
+            from += count;
+        }
+        None
+    }
+
+    /// A new chunk; none where there is no more room.
+    #[cold]
+    fn chunk(&mut self, room: u32, budget: &Budget) -> Option<u32> {
+        let slab = 1_u64 << self.shift;
+        let left =
+            (self.slabs as u64 * slab).saturating_sub(self.used).min(slab - self.used % slab);
+        if left < u64::from(room) {
+            // A slab's end that is too short stays empty.
+            self.used = self.used.next_multiple_of(slab);
+        }
+        if self.used == self.slabs as u64 * slab {
+            // Rows have numbers of 32 bits. A first slab is always there to go on with.
+            let may = self.used + slab < 1 << 32 && (self.slabs == 0 || budget.take());
+            if !may {
+                return None;
+            }
+            self.columns.as_mut().expect("there is a batch").add_slab(1 << self.shift);
+            self.slabs += 1;
+        }
+        let chunk = self.chunks.len() as u32;
+        self.chunks.push(Chunk { start: self.used as u32, room, next: chunk });
+        self.used += u64::from(room);
+        Some(chunk)
+    }
+}
+
+/// A tile's rows in one part, chunk by chunk.
+#[derive(Debug)]
+pub(super) struct Chunks<'a> {
+    part: &'a Part,
+    next: Option<u32>,
+    last: u32,
+    /// Where the last one's rows end.
+    at: u32,
+}
+
+impl Iterator for Chunks<'_> {
+    type Item = Rows;
+
+    fn next(&mut self) -> Option<Rows> {
+        let this = self.next?;
+        let chunk = self.part.chunks[this as usize];
+        let is_last = this == self.last;
+        self.next = (!is_last).then_some(chunk.next);
+        let count = if is_last { self.at - chunk.start } else { chunk.room };
+        Some(Rows {
+            slab: (chunk.start >> self.part.shift) as usize,
+            start: chunk.start as usize & ((1 << self.part.shift) - 1),
+            count: count as usize,
+        })
+    }
+}
