@@ -8,7 +8,7 @@ use std::fmt;
 use arrow_buffer::{Buffer, ScalarBuffer};
 use half::f16;
 
-use crate::trace::bins::{Binned, BinnedColumn, Copies, Rows};
+use crate::trace::bins::{Binned, BinnedColumn, Copies, Rows, Slabs};
 use crate::trace::column::{Column, Native, Scalar, ValueType};
 use crate::trace::columns::ColumnKind;
 use crate::trace::fragment::SampleMask;
@@ -53,7 +53,7 @@ pub trait Cells: Sized {
     /// The column in bins that have no rows yet.
     fn binned(&self) -> Self::Binned;
     /// Copies rows to bins.
-    fn bin(&self, to: &mut Self::Binned, copies: &Copies);
+    fn bin(&self, to: &Self::Binned, slabs: &mut Slabs, copies: &Copies);
 }
 
 impl<T: Native> Cells for Column<T> {
@@ -135,9 +135,8 @@ impl<T: Native> Cells for Column<T> {
         BinnedColumn::like(self)
     }
 
-    #[inline(always)]
-    fn bin(&self, to: &mut BinnedColumn<T>, copies: &Copies) {
-        to.put(self, copies);
+    fn bin(&self, to: &BinnedColumn<T>, slabs: &mut Slabs, copies: &Copies) {
+        to.put(self, slabs, copies);
     }
 }
 
@@ -146,14 +145,14 @@ impl<T: Native> Binned<T> for BinnedColumn<T> {
         BinnedColumn::bytes(self)
     }
 
-    fn add_slab(&mut self, rows: usize) {
-        BinnedColumn::add_slab(self, rows);
+    fn place(&mut self, before: usize) {
+        BinnedColumn::place(self, before);
     }
 
     #[inline(always)]
-    fn read(&self, rows: Rows, to: &mut [T], _: SampleMask) {
+    fn read(&self, from: (&Slabs, Rows), to: &mut [T], _: SampleMask) {
         self.get(
-            rows,
+            from,
             to,
             #[inline(always)]
             |v| v,
@@ -335,11 +334,10 @@ macro_rules! either {
                 }
             }
 
-            #[inline(always)]
-            fn bin(&self, to: &mut $binned, copies: &Copies) {
+            fn bin(&self, to: &$binned, slabs: &mut Slabs, copies: &Copies) {
                 match (self, to) {
-                    $(($name::$variant(column), $binned::$variant(to)) => to.put(column, copies),)+
-                    ($name::$last(column), $binned::$last(to)) => to.put(column, copies),
+                    $(($name::$variant(column), $binned::$variant(to)) => to.put(column, slabs, copies),)+
+                    ($name::$last(column), $binned::$last(to)) => to.put(column, slabs, copies),
                     _ => unreachable!("a column has one type in all of a trace's batches"),
                 }
             }
@@ -359,28 +357,28 @@ macro_rules! either {
                 }
             }
 
-            fn add_slab(&mut self, rows: usize) {
+            fn place(&mut self, before: usize) {
                 match self {
-                    $($binned::$variant(column) => column.add_slab(rows),)+
-                    $binned::$last(column) => column.add_slab(rows),
+                    $($binned::$variant(column) => column.place(before),)+
+                    $binned::$last(column) => column.place(before),
                 }
             }
 
             #[inline(always)]
-            fn read(&self, rows: Rows, to: &mut [$wide], mask: SampleMask) {
+            fn read(&self, from: (&Slabs, Rows), to: &mut [$wide], mask: SampleMask) {
                 #[inline(always)]
                 fn copied($value: $wide, $mask: SampleMask) -> $wide {
                     $copied
                 }
                 match self {
                     $($binned::$variant(column) => column.get(
-                        rows,
+                        from,
                         to,
                         #[inline(always)]
                         |v| copied(v.wide(), mask),
                     ),)+
                     $binned::$last(column) => column.get(
-                        rows,
+                        from,
                         to,
                         #[inline(always)]
                         |v| copied(v, mask),

@@ -2,21 +2,18 @@
 
 use std::fmt;
 
-use crate::trace::batch::MAX_BATCH_ROWS;
+use crate::trace::bins::slabs::{RowNumber, Slabs};
 use crate::trace::column::{Column, Native};
 use crate::trace::fragment::SampleMask;
-
-/// Rows that are copied at a time, at least.
-pub(super) const STRETCH: usize = 16;
 
 /// A column in bins, of values that blocks have as `V`.
 pub trait Binned<V>: fmt::Debug + Send + Sync {
     /// What a row takes: nothing where all are the same.
     fn bytes(&self) -> usize;
-    /// Adds room for `rows` rows.
-    fn add_slab(&mut self, rows: usize);
+    /// Places it after columns of which a row takes `before` bytes.
+    fn place(&mut self, before: usize);
     /// Copies rows to a block, masks as far as they lie within `mask`.
-    fn read(&self, rows: Rows, to: &mut [V], mask: SampleMask);
+    fn read(&self, from: (&Slabs, Rows), to: &mut [V], mask: SampleMask);
 }
 
 /// Rows that lie one after the other in a slab.
@@ -27,88 +24,124 @@ pub struct Rows {
     pub count: usize,
 }
 
-/// Where rows of a batch go. Rows are numbered through all slabs.
-#[derive(Debug, Default)]
+/// Where rows of a batch go, in pieces of 1, 2, 4, 8 and 16 rows: a loop for each length, that
+/// is known when this is compiled. Most runs are of a few rows.
+#[derive(Debug)]
 pub struct Copies {
-    /// The binary logarithm of a slab's rows.
-    shift: u32,
-    /// First rows there and here: a whole stretch's worth is copied for each, and what is too
-    /// much is written over by the tile's next rows. A length known when this is compiled is
-    /// worth more than a copy that ends where it should.
-    stretches: Vec<(u32, u32)>,
-    /// Those that would write beyond their chunk or read beyond their batch, and their
-    /// counts. They come last of what is copied to a chunk.
-    ends: Vec<(u32, u32, u32)>,
+    /// For each length, the pieces' first rows there and here.
+    pieces: [Box<[(u32, RowNumber); STEP + 1]>; LENGTHS],
+    counts: [usize; LENGTHS],
+}
+
+/// How many lengths of pieces there are.
+const LENGTHS: usize = 5;
+
+/// Rows that are copied at a time, at most: what is copied of them, column by column, still
+/// lies in the nearest cache.
+pub(super) const STEP: usize = 1 << 12;
+
+impl Default for Copies {
+    fn default() -> Self {
+        let pieces = std::array::from_fn(|_| Box::new([(0, RowNumber(0)); STEP + 1]));
+        Copies { pieces, counts: [0; LENGTHS] }
+    }
 }
 
 impl Copies {
-    pub(super) fn new(shift: u32) -> Self {
-        Copies { shift, ..Copies::default() }
-    }
-
     pub(super) fn clear(&mut self) {
-        self.stretches.clear();
-        self.ends.clear();
+        self.counts = [0; LENGTHS];
     }
 
-    /// Adds `count` rows, of those that a batch of `len` has from `from` on, for a chunk
-    /// that has `room` for as many from `to` on.
+    /// Adds `count` rows from `from` on, for as many from `to` on in one slab.
     #[inline]
-    pub(super) fn add(&mut self, from: usize, len: usize, to: u32, room: u32, count: usize) {
-        debug_assert!(count <= STRETCH && len <= MAX_BATCH_ROWS);
-        if room >= STRETCH as u32 && len - from >= STRETCH {
-            self.stretches.push((from as u32, to));
-        } else {
-            self.ends.push((from as u32, to, count as u32));
+    pub(super) fn add(&mut self, from: usize, to: RowNumber, count: u32) {
+        const LONGEST: u32 = 1 << (LENGTHS - 1);
+        let (mut from, mut to, mut left) = (from as u32, to.0, count);
+        while left >= LONGEST {
+            self.pieces[LENGTHS - 1][self.counts[LENGTHS - 1]] = (from, RowNumber(to));
+            self.counts[LENGTHS - 1] += 1;
+            (from, to, left) = (from + LONGEST, to + LONGEST, left - LONGEST);
+        }
+        // No jump depends on the count: what is no piece is written over by the next.
+        for i in (0..LENGTHS - 1).rev() {
+            self.pieces[i][self.counts[i]] = (from, RowNumber(to));
+            let is_piece = left >> i & 1;
+            self.counts[i] += is_piece as usize;
+            (from, to) = (from + (is_piece << i), to + (is_piece << i));
         }
     }
 
-    /// Copies `values`, which lack the batch's first `missing`.
-    #[inline(always)]
-    pub(super) fn put<T: Copy>(&self, values: &[T], missing: usize, slabs: &mut [Box<[T]>]) {
-        let last = (1_usize << self.shift) - 1;
-        for &(from, to) in &self.stretches {
-            let (from, to) = (from as usize - missing, to as usize);
-            let values: &[T; STRETCH] =
-                values[from..from + STRETCH].try_into().expect("of this length");
-            let slab = &mut slabs[to >> self.shift];
-            let to = to & last;
-            let to: &mut [T; STRETCH] =
-                (&mut slab[to..to + STRETCH]).try_into().expect("of this length");
-            *to = *values;
+    /// Copies a column's values of `size` bytes, which lack the batch's first `missing`, to
+    /// where the column begins in a slab.
+    pub(super) fn put(&self, size: usize, values: &[u8], missing: usize, to: (&mut Slabs, usize)) {
+        match size {
+            1 => self.put_sized::<1, 2, 4, 8, 16>(values, missing, to),
+            2 => self.put_sized::<2, 4, 8, 16, 32>(values, missing, to),
+            4 => self.put_sized::<4, 8, 16, 32, 64>(values, missing, to),
+            _ => self.put_sized::<8, 16, 32, 64, 128>(values, missing, to),
         }
-        for &(from, to, count) in &self.ends {
-            let (from, to, count) = (from as usize - missing, to as usize, count as usize);
-            let slab = &mut slabs[to >> self.shift];
-            let to = &mut slab[to & last..][..count];
-            for (to, value) in to.iter_mut().zip(&values[from..from + count]) {
-                *to = *value;
-            }
+    }
+
+    /// The same for pieces that take so many bytes.
+    fn put_sized<const A: usize, const B: usize, const C: usize, const D: usize, const E: usize>(
+        &self,
+        values: &[u8],
+        missing: usize,
+        (slabs, start): (&mut Slabs, usize),
+    ) {
+        self.put_pieces::<A, E>(4, values, missing, slabs, start);
+        self.put_pieces::<A, D>(3, values, missing, slabs, start);
+        self.put_pieces::<A, C>(2, values, missing, slabs, start);
+        self.put_pieces::<A, B>(1, values, missing, slabs, start);
+        self.put_pieces::<A, A>(0, values, missing, slabs, start);
+    }
+
+    #[inline(always)]
+    fn put_pieces<const SIZE: usize, const BYTES: usize>(
+        &self,
+        list: usize,
+        values: &[u8],
+        missing: usize,
+        slabs: &mut Slabs,
+        start: usize,
+    ) {
+        for &(from, to) in &self.pieces[list][..self.counts[list]] {
+            let from = (from as usize - missing) * SIZE;
+            let values: &[u8; BYTES] =
+                values[from..from + BYTES].try_into().expect("of this length");
+            let slab = slabs.bytes_mut(to.slab());
+            let to = start + to.place() * SIZE;
+            let to: &mut [u8; BYTES] =
+                (&mut slab[to..to + BYTES]).try_into().expect("of this length");
+            *to = *values;
         }
     }
 }
 
-/// Values in slabs, or one for all.
+/// A value for each row, or one for all.
 #[derive(Debug)]
 pub enum BinnedColumn<T> {
     Constant(T),
-    Values(Vec<Box<[T]>>),
+    /// Bytes that a row takes in the columns before it.
+    Values(usize),
 }
 
 impl<T: Native> BinnedColumn<T> {
-    /// One without rows, for columns like this.
+    /// One for columns like this.
     pub fn like(column: &Column<T>) -> Self {
         match column {
             Column::Constant(value) => BinnedColumn::Constant(*value),
-            Column::Values(_) => BinnedColumn::Values(Vec::new()),
+            Column::Values(_) => BinnedColumn::Values(0),
         }
     }
 
     /// Copies a batch's values.
-    #[inline(always)]
-    pub fn put(&mut self, column: &Column<T>, copies: &Copies) {
+    pub fn put(&self, column: &Column<T>, slabs: &mut Slabs, copies: &Copies) {
         match (self, column) {
-            (BinnedColumn::Values(slabs), Column::Values(values)) => copies.put(values, 0, slabs),
+            (BinnedColumn::Values(before), Column::Values(values)) => {
+                let start = before * slabs.rows();
+                copies.put(size_of::<T>(), values.inner().as_slice(), 0, (slabs, start));
+            }
             (BinnedColumn::Constant(_), Column::Constant(_)) => {}
             _ => unreachable!("a column is constant in all of a trace's batches or in none"),
         }
@@ -116,13 +149,21 @@ impl<T: Native> BinnedColumn<T> {
 
     /// Copies rows to a block, each changed.
     #[inline(always)]
-    pub fn get<V: Copy>(&self, rows: Rows, to: &mut [V], change: impl Fn(T) -> V) {
+    pub fn get<V: Copy>(
+        &self,
+        (slabs, rows): (&Slabs, Rows),
+        to: &mut [V],
+        change: impl Fn(T) -> V,
+    ) {
+        let to = &mut to[..rows.count];
         match self {
-            BinnedColumn::Constant(value) => to[..rows.count].fill(change(*value)),
-            BinnedColumn::Values(slabs) => {
-                let values = &slabs[rows.slab][rows.start..rows.start + rows.count];
-                for (to, value) in to[..rows.count].iter_mut().zip(values) {
-                    *to = change(*value);
+            BinnedColumn::Constant(value) => to.fill(change(*value)),
+            BinnedColumn::Values(before) => {
+                let size = size_of::<T>();
+                let start = before * slabs.rows() + rows.start * size;
+                let values = &slabs.bytes(rows.slab)[start..start + rows.count * size];
+                for (to, value) in to.iter_mut().zip(values.chunks_exact(size)) {
+                    *to = change(T::from_bytes(value));
                 }
             }
         }
@@ -131,19 +172,13 @@ impl<T: Native> BinnedColumn<T> {
     pub fn bytes(&self) -> usize {
         match self {
             BinnedColumn::Constant(_) => 0,
-            BinnedColumn::Values(_) => T::TYPE.bytes(),
+            BinnedColumn::Values(_) => size_of::<T>(),
         }
     }
 
-    pub fn add_slab(&mut self, rows: usize) {
-        if let BinnedColumn::Values(slabs) = self {
-            slabs.push(slab(rows));
+    pub fn place(&mut self, bytes: usize) {
+        if let BinnedColumn::Values(before) = self {
+            *before = bytes;
         }
     }
-}
-
-/// Room for so many rows. It is zero as it comes from the system: nothing is touched before
-/// rows arrive.
-pub(super) fn slab<T: Native>(rows: usize) -> Box<[T]> {
-    vec![T::default(); rows].into_boxed_slice()
 }

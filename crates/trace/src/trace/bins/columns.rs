@@ -1,10 +1,13 @@
 //! All columns of bins, and blocks made of them.
 
+use std::ops::Range;
+
 use fearless_simd::{Level, dispatch};
 
-use crate::tile::{TILE_SIDE, TileGrid, TileId};
+use crate::tile::TILE_SIDE;
 use crate::trace::batch::Batch;
-use crate::trace::bins::column::{Binned, Copies, Rows, slab};
+use crate::trace::bins::column::{Binned, Copies, Rows, STEP};
+use crate::trace::bins::slabs::Slabs;
 use crate::trace::block::Block;
 use crate::trace::cells::{Cells, ChannelColumn, CoverageColumn};
 use crate::trace::column::Column;
@@ -27,7 +30,6 @@ macro_rules! binned {
         /// The columns of bins, in the types that the trace has them in.
         #[derive(Debug)]
         pub(super) struct BinnedColumns {
-            within: Vec<Box<[u8]>>,
             $($name: <$type as Cells>::Binned,)*
             $($oname: Option<<$otype as Cells>::Binned>,)*
         }
@@ -35,11 +37,22 @@ macro_rules! binned {
         impl BinnedColumns {
             /// Columns without rows, of the types that `batch` has.
             pub(super) fn like(batch: &Batch) -> Self {
-                BinnedColumns {
-                    within: Vec::new(),
+                let mut columns = BinnedColumns {
                     $($name: batch.$name.binned(),)*
                     $($oname: batch.$oname.as_ref().map(Cells::binned),)*
-                }
+                };
+                // The places come first.
+                let mut before = size_of::<u8>();
+                $(
+                    columns.$name.place(before);
+                    before += columns.$name.bytes();
+                )*
+                $(if let Some(column) = &mut columns.$oname {
+                    column.place(before);
+                    before += column.bytes();
+                })*
+                let _ = before;
+                columns
             }
 
             /// What a row takes.
@@ -49,44 +62,35 @@ macro_rules! binned {
                     $(+ self.$oname.as_ref().map_or(0, Binned::bytes))*
             }
 
-            /// Adds room for `rows` rows.
-            pub(super) fn add_slab(&mut self, rows: usize) {
-                self.within.push(slab(rows));
-                $(self.$name.add_slab(rows);)*
-                $(if let Some(column) = &mut self.$oname {
-                    column.add_slab(rows);
-                })*
-            }
-
             /// Copies a batch's rows; `within` are the places of those from `first` on.
-            #[inline(always)]
-            fn put(&mut self, batch: &Batch, copies: &Copies, within: &[u8], first: usize) {
-                copies.put(within, first, &mut self.within);
-                $(batch.$name.bin(&mut self.$name, copies);)*
-                $(if let (Some(from), Some(to)) = (&batch.$oname, &mut self.$oname) {
-                    from.bin(to, copies);
+            fn put(&self, batch: &Batch, slabs: &mut Slabs, copies: &Copies, within: (&[u8], usize)) {
+                copies.put(size_of::<u8>(), within.0, within.1, (slabs, 0));
+                $(batch.$name.bin(&self.$name, slabs, copies);)*
+                $(if let (Some(from), Some(to)) = (&batch.$oname, &self.$oname) {
+                    from.bin(to, slabs, copies);
                 })*
             }
 
             /// Copies rows to a block's end.
             #[inline(always)]
-            fn get(&self, rows: Rows, to: &mut Block, [left, top]: [u16; 2], wanted: Wanted) {
+            fn get(&self, from: (&Slabs, Rows), to: &mut Block, [left, top]: [u16; 2], wanted: Wanted) {
+                let (slabs, rows) = from;
                 let at = to.len..to.len + rows.count;
-                let within = &self.within[rows.slab][rows.start..rows.start + rows.count];
+                let within = &slabs.bytes(rows.slab)[rows.start..rows.start + rows.count];
                 let xy = to.x[at.clone()].iter_mut().zip(&mut to.y[at.clone()]);
                 for ((x, y), within) in xy.zip(within) {
                     let within = u16::from(*within);
                     *x = left + within % TILE_SIDE as u16;
                     *y = top + within / TILE_SIDE as u16;
                 }
-                $(self.$name.read(rows, &mut to.$name[at.clone()], wanted.samples);)*
+                $(self.$name.read(from, &mut to.$name[at.clone()], wanted.samples);)*
                 $(
                     let read = wanted.columns.contains(crate::trace::columns::ColumnId::$oid);
                     match (self.$oname.as_ref().filter(|_| read), &mut to.$oname) {
                         (Some(column), values) => {
                             let room = || Box::new([$default; crate::trace::block::BLOCK]);
                             let values = values.get_or_insert_with(room);
-                            column.read(rows, &mut values[at.clone()], wanted.samples);
+                            column.read(from, &mut values[at.clone()], wanted.samples);
                         }
                         (None, Some(values)) => values[at.clone()].fill($default),
                         (None, None) => {}
@@ -108,43 +112,32 @@ pub struct Wanted {
     pub columns: ColumnSet,
 }
 
-/// Rows whose places in the tile are worked out at a time: what is copied of them, column by
-/// column, still lies in the nearest cache.
-pub(super) const STEP: usize = 1 << 12;
-
-/// Places in the tile, and room to read a stretch beyond them.
-pub(super) type Within = [u8; STEP + super::column::STRETCH];
-
 impl BinnedColumns {
     /// Copies rows of `batch`, from row `first` on, with the instructions of `level`;
     /// `within` is where their places are put meanwhile.
     pub(super) fn copy(
-        &mut self,
+        &self,
         level: Level,
         batch: &Batch,
-        first: usize,
-        count: usize,
-        copies: &Copies,
-        within: &mut Within,
+        rows: Range<usize>,
+        to: (&mut Slabs, &Copies),
+        within: &mut [u8; STEP],
     ) {
-        dispatch!(level, _ => {
-            find_places(batch, first, &mut within[..count]);
-            self.put(batch, copies, within, first);
-        });
+        let within = &mut within[..rows.len()];
+        dispatch!(level, _ => find_places(batch, rows.start, within));
+        self.put(batch, to.0, to.1, (within, rows.start));
     }
 
     /// Copies rows of `tile` to a block's end, with the instructions of `level`.
     pub(super) fn append(
         &self,
         level: Level,
-        rows: Rows,
+        from: (&Slabs, Rows),
         to: &mut Block,
-        grid: TileGrid,
-        tile: TileId,
+        corner: (u32, u32),
         wanted: Wanted,
     ) {
-        let (x, y) = grid.pixel(tile, 0);
-        dispatch!(level, _ => self.get(rows, to, [x as u16, y as u16], wanted));
+        dispatch!(level, _ => self.get(from, to, [corner.0 as u16, corner.1 as u16], wanted));
     }
 }
 

@@ -15,6 +15,7 @@ mod kept;
 mod part;
 mod rows;
 mod runs;
+mod slabs;
 #[cfg(test)]
 mod tests;
 
@@ -33,11 +34,10 @@ pub use rows::TileRows;
 
 pub(super) use column::{Binned, BinnedColumn, Copies, Rows};
 pub(super) use kept::Kept;
+pub(super) use slabs::Slabs;
 
 use part::{LAST_CHUNK, Part};
-
-/// Rows of a slab, at most: few, as each part's last one is partly empty.
-const SLAB_ROWS: u64 = 1 << 16;
+use slabs::LARGE_PAGE;
 
 /// Rows of a part, at least: with fewer there would be more chunks that are partly empty.
 const PART_ROWS: u64 = 1 << 18;
@@ -76,12 +76,15 @@ impl Bins {
         let row = Self::bytes_per_row(trace);
         let rows = rows.min(trace.rows()).max(1);
         let threads = rayon::current_num_threads() as u64;
-        let parts = threads.min(rows / PART_ROWS).min(bytes / (8 * SLAB_ROWS * row)).max(1);
-        // A fourth of what may be taken, as parts and tiles are not all alike.
-        let most = (bytes / (4 * row * parts)).clamp(1, SLAB_ROWS);
-        let slab_rows = rows.next_power_of_two().min(1 << most.ilog2()).max(LAST_CHUNK.into());
+        let fill = bytes / (8 * LARGE_PAGE as u64);
+        let parts = threads.min(rows / PART_ROWS).min(fill).max(1);
+        // A large page's worth, or less: a few for each part, as their last ones are partly
+        // empty, and no more than there are rows.
+        let most = (bytes / (4 * row * parts)).min(rows).min(LARGE_PAGE as u64 / row);
+        let chunk = u64::from(LAST_CHUNK);
+        let slab_rows = (most / chunk * chunk).clamp(chunk, Slabs::MOST_ROWS as u64);
         let grid = TileGrid::new(trace.header().width, trace.header().height);
-        let part = |_| Part::new(grid, slab_rows.ilog2());
+        let part = |_| Part::new(grid, slab_rows as usize);
         Bins {
             level: Level::new(),
             grid,

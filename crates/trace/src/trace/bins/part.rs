@@ -7,10 +7,12 @@ use fearless_simd::Level;
 
 use crate::tile::{TileGrid, TileId, TileMap};
 use crate::trace::batch::Batch;
-use crate::trace::bins::Tiles;
-use crate::trace::bins::column::{Copies, Rows, STRETCH};
-use crate::trace::bins::columns::{BinnedColumns, STEP, Within};
+use crate::trace::bins::column::{Copies, Rows, STEP};
+use crate::trace::bins::columns::BinnedColumns;
 use crate::trace::bins::runs::for_each_run;
+use crate::trace::bins::slabs::{RowNumber, Slabs};
+use crate::trace::bins::{Tiles, Wanted};
+use crate::trace::block::Block;
 
 /// Rows of a tile's first chunk; each that follows holds twice as many, so that little is
 /// wasted on tiles with few fragments and none of the others is in many pieces.
@@ -24,15 +26,14 @@ pub(super) const LAST_CHUNK: u32 = 512;
 pub(super) struct Part {
     /// None before the first batch.
     columns: Option<BinnedColumns>,
-    /// The binary logarithm of a slab's rows, the slabs there are, and the rows given away,
-    /// numbered through all of them.
-    shift: u32,
-    slabs: usize,
-    used: u64,
+    slabs: Slabs,
+    /// Slabs that have been begun, and rows that are given away of the last of these.
+    begun: usize,
+    used: usize,
     lists: TileMap<List>,
     chunks: Vec<Chunk>,
     copies: Copies,
-    within: Box<Within>,
+    within: Box<[u8; STEP]>,
 }
 
 /// A tile's rows.
@@ -68,37 +69,37 @@ impl Budget {
 }
 
 impl Part {
-    /// An empty one, whose slabs hold 2^`shift` rows.
-    pub(super) fn new(grid: TileGrid, shift: u32) -> Self {
+    /// An empty one, whose slabs hold so many rows.
+    pub(super) fn new(grid: TileGrid, slab_rows: usize) -> Self {
         Part {
             columns: None,
-            shift,
-            slabs: 0,
+            slabs: Slabs::new(slab_rows),
+            begun: 0,
             used: 0,
             lists: TileMap::new(grid),
             chunks: Vec::new(),
-            copies: Copies::new(shift),
-            within: Box::new([0; STEP + STRETCH]),
+            copies: Copies::default(),
+            within: Box::new([0; STEP]),
         }
     }
 
     /// Removes all rows; their memory is kept.
     pub(super) fn clear(&mut self) {
-        self.used = 0;
+        (self.begun, self.used) = (0, 0);
         self.lists.clear();
         self.chunks.clear();
     }
 
     /// How many slabs there are.
     pub(super) fn slabs(&self) -> usize {
-        self.slabs
+        self.slabs.count()
     }
 
     /// Bytes that it takes.
     pub(super) fn bytes(&self) -> u64 {
         let row = self.columns.as_ref().map_or(0, BinnedColumns::bytes);
         let lists = self.lists.touched().len() * size_of::<(TileId, List)>();
-        ((self.slabs * row) as u64 * (1 << self.shift))
+        (self.slabs.count() * self.slabs.rows() * row) as u64
             + (lists + self.chunks.capacity() * size_of::<Chunk>()) as u64
     }
 
@@ -113,9 +114,17 @@ impl Part {
         Some(Chunks { part: self, next: Some(list.first), last: list.last, at: list.at })
     }
 
-    /// The columns.
-    pub(super) fn columns(&self) -> &BinnedColumns {
-        self.columns.as_ref().expect("it has rows")
+    /// Copies rows to a block's end, of the tile with this `corner`.
+    pub(super) fn append(
+        &self,
+        level: Level,
+        rows: Rows,
+        to: &mut Block,
+        corner: (u32, u32),
+        wanted: Wanted,
+    ) {
+        let columns = self.columns.as_ref().expect("it has rows");
+        columns.append(level, (&self.slabs, rows), to, corner, wanted);
     }
 
     /// Sorts those rows of `batch` that belong to `tiles`. Tells the row before which it
@@ -132,8 +141,9 @@ impl Part {
         for first in rows.clone().step_by(STEP) {
             let some = first..rows.end.min(first + STEP);
             let full = self.find(level, batch, some.clone(), tiles, budget);
-            let columns = self.columns.as_mut().expect("it is there");
-            columns.copy(level, batch, first, some.len(), &self.copies, &mut self.within);
+            let columns = self.columns.as_ref().expect("it is there");
+            let to = (&mut self.slabs, &self.copies);
+            columns.copy(level, batch, some, to, &mut self.within);
             if full.is_some() {
                 return full;
             }
@@ -151,7 +161,7 @@ impl Part {
         budget: &Budget,
     ) -> Option<usize> {
         self.copies.clear();
-        let (grid, len) = (self.lists.grid(), batch.len());
+        let grid = self.lists.grid();
         let mut full = None;
         for_each_run(level, batch, rows, |(x, y), run| {
             let tile = grid.tile(x, y);
@@ -159,9 +169,9 @@ impl Part {
                 return;
             }
             match tiles {
-                Tiles::All => full = self.add(tile, run, len, budget),
+                Tiles::All => full = self.add(tile, run, budget),
                 Tiles::Range(some) if some.contains(&tile.0) => {
-                    full = self.add(tile, run, len, budget);
+                    full = self.add(tile, run, budget);
                 }
                 Tiles::Part(only, within) if tile == *only => {
                     let held = |row: &usize| {
@@ -169,7 +179,7 @@ impl Part {
                         within.contains(&TileGrid::within(x, y))
                     };
                     let mut held = run.filter(held);
-                    full = held.find_map(|row| self.add(tile, row..row + 1, len, budget));
+                    full = held.find_map(|row| self.add(tile, row..row + 1, budget));
                 }
                 _ => {}
             }
@@ -177,15 +187,9 @@ impl Part {
         full
     }
 
-    /// Finds where rows of one tile go, of a batch of `len`.
+    /// Finds where rows of one tile go.
     #[inline]
-    fn add(
-        &mut self,
-        tile: TileId,
-        rows: Range<usize>,
-        len: usize,
-        budget: &Budget,
-    ) -> Option<usize> {
+    fn add(&mut self, tile: TileId, rows: Range<usize>, budget: &Budget) -> Option<usize> {
         let slot = match self.lists.slot(tile) {
             Some(slot) => slot,
             None => {
@@ -209,12 +213,11 @@ impl Part {
                 (list.last, list.at, list.end) = (chunk, start, start + room);
                 continue;
             }
-            let room = list.end - list.at;
-            let count = (rows.end - from).min(STRETCH).min(room as usize);
-            self.copies.add(from, len, list.at, room, count);
-            list.at += count as u32;
-            list.rows += count as u64;
-            from += count;
+            let count = ((rows.end - from) as u32).min(list.end - list.at);
+            self.copies.add(from, RowNumber(list.at), count);
+            list.at += count;
+            list.rows += u64::from(count);
+            from += count as usize;
         }
         None
     }
@@ -222,25 +225,24 @@ impl Part {
     /// A new chunk; none where there is no more room.
     #[cold]
     fn chunk(&mut self, room: u32, budget: &Budget) -> Option<u32> {
-        let slab = 1_u64 << self.shift;
-        let left =
-            (self.slabs as u64 * slab).saturating_sub(self.used).min(slab - self.used % slab);
-        if left < u64::from(room) {
-            // A slab's end that is too short stays empty.
-            self.used = self.used.next_multiple_of(slab);
-        }
-        if self.used == self.slabs as u64 * slab {
-            // Rows have numbers of 32 bits. A first slab is always there to go on with.
-            let may = self.used + slab < 1 << 32 && (self.slabs == 0 || budget.take());
-            if !may {
-                return None;
+        // A slab's end that is too short stays empty.
+        if self.begun == 0 || self.used + room as usize > self.slabs.rows() {
+            let count = self.slabs.count();
+            if self.begun == count {
+                // A first slab is always there to go on with.
+                let may = count < Slabs::MOST && (count == 0 || budget.take());
+                if !may {
+                    return None;
+                }
+                let columns = self.columns.as_ref().expect("there is a batch");
+                self.slabs.add(columns.bytes());
             }
-            self.columns.as_mut().expect("there is a batch").add_slab(1 << self.shift);
-            self.slabs += 1;
+            (self.begun, self.used) = (self.begun + 1, 0);
         }
         let chunk = self.chunks.len() as u32;
-        self.chunks.push(Chunk { start: self.used as u32, room, next: chunk });
-        self.used += u64::from(room);
+        let start = RowNumber::new(self.begun - 1, self.used).0;
+        self.chunks.push(Chunk { start, room, next: chunk });
+        self.used += room as usize;
         Some(chunk)
     }
 }
@@ -265,8 +267,8 @@ impl Iterator for Chunks<'_> {
         self.next = (!is_last).then_some(chunk.next);
         let count = if is_last { self.at - chunk.start } else { chunk.room };
         Some(Rows {
-            slab: (chunk.start >> self.part.shift) as usize,
-            start: chunk.start as usize & ((1 << self.part.shift) - 1),
+            slab: RowNumber(chunk.start).slab(),
+            start: RowNumber(chunk.start).place(),
             count: count as usize,
         })
     }

@@ -46,7 +46,8 @@ impl<'a> TileRows<'a> {
             let count = self.chunk.count.min(BLOCK - block.rows());
             let rows = Rows { count, ..self.chunk };
             let Bins { level, grid, parts, .. } = self.bins;
-            parts[self.part].columns().append(*level, rows, block, *grid, self.tile, self.wanted);
+            let corner = grid.pixel(self.tile, 0);
+            parts[self.part].append(*level, rows, block, corner, self.wanted);
             self.chunk.start += count;
             self.chunk.count -= count;
             self.left -= count as u64;
