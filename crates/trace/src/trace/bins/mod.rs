@@ -83,13 +83,18 @@ impl Bins {
         let most = (bytes / (4 * row * parts)).min(rows).min(LARGE_PAGE as u64 / row);
         let chunk = u64::from(LAST_CHUNK);
         let slab_rows = (most / chunk * chunk).clamp(chunk, Slabs::MOST_ROWS as u64);
+        Self::of_parts(trace, parts as usize, slab_rows, bytes)
+    }
+
+    /// Empty ones of so many parts, for which slabs have so many rows.
+    fn of_parts(trace: &Trace, parts: usize, slab_rows: u64, bytes: u64) -> Self {
         let grid = TileGrid::new(trace.header().width, trace.header().height);
         let part = |_| Part::new(grid, slab_rows as usize);
         Bins {
             level: Level::new(),
             grid,
             bytes,
-            row,
+            row: Self::bytes_per_row(trace),
             slab_rows,
             parts: (0..parts).map(part).collect(),
             tiles: TileMap::new(grid),

@@ -95,9 +95,14 @@ impl Part {
         self.slabs.count()
     }
 
+    /// Bytes that a row takes.
+    pub(super) fn bytes_per_row(&self) -> usize {
+        self.columns.as_ref().map_or(0, BinnedColumns::bytes)
+    }
+
     /// Bytes that it takes.
     pub(super) fn bytes(&self) -> u64 {
-        let row = self.columns.as_ref().map_or(0, BinnedColumns::bytes);
+        let row = self.bytes_per_row();
         let lists = self.lists.touched().len() * size_of::<(TileId, List)>();
         (self.slabs.count() * self.slabs.rows() * row) as u64
             + (lists + self.chunks.capacity() * size_of::<Chunk>()) as u64
