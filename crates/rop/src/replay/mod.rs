@@ -14,6 +14,8 @@ mod blocks;
 mod explain;
 mod group;
 mod options;
+#[cfg(test)]
+mod tests;
 mod whole;
 mod windows;
 
