@@ -103,7 +103,7 @@ impl Part {
     /// Bytes that it takes.
     pub(super) fn bytes(&self) -> u64 {
         let row = self.bytes_per_row();
-        let lists = self.lists.touched().len() * size_of::<(TileId, List)>();
+        let lists = size_of_val(self.lists.touched());
         (self.slabs.count() * self.slabs.rows() * row) as u64
             + (lists + self.chunks.capacity() * size_of::<Chunk>()) as u64
     }
