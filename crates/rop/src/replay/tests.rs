@@ -146,7 +146,7 @@ fn replays_of_one_trace_at_the_same_time_share_its_bins() {
             scope.spawn(move || {
                 for _ in 0..5 {
                     if i == 0 {
-                        trace.forget_bins();
+                        Trace::forget_bins();
                     }
                     assert!(result(trace, 8, design, ReplayOptions::default()) == *expected);
                 }

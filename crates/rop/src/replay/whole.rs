@@ -12,7 +12,7 @@ use crate::replay::{Drawn, Job};
 use screendoor_trace::error::Result;
 use screendoor_trace::picture::TilePixels;
 use screendoor_trace::tile::{TileId, TileMap};
-use screendoor_trace::trace::{Bins, Block, RowPlace, Tiles};
+use screendoor_trace::trace::{Bins, Block, RowPlace, Tiles, Trace};
 
 /// The trace's fragments sorted into tiles, those that are kept or new ones; `None` where they
 /// take more than they may.
@@ -21,9 +21,7 @@ use screendoor_trace::trace::{Bins, Block, RowPlace, Tiles};
 /// As [`screendoor_trace::trace::Trace::batch`].
 pub(super) fn bins(job: &Job<'_>) -> Result<Option<Arc<Bins>>> {
     let Job { trace, options, .. } = job;
-    if (options.window as u64) < trace.rows() {
-        return Ok(None);
-    }
+    let in_windows = (options.window as u64) < trace.rows();
     let fits = |bins: &Bins| match job.design.bytes_per_fragment() {
         None => bins.bytes() <= options.memory,
         // A tile's state has to fit beside them.
@@ -34,16 +32,21 @@ pub(super) fn bins(job: &Job<'_>) -> Result<Option<Arc<Bins>>> {
         }
     };
     if options.keep
+        && !in_windows
         && let Some(bins) = trace.kept_bins()?
         && fits(&bins)
     {
         return Ok(Some(bins));
     }
+    if options.keep {
+        // What comes may take all the memory that there is for fragments.
+        Trace::forget_bins();
+    }
     let memory = match job.design.bytes_per_fragment() {
         None => options.memory,
         Some(_) => options.memory / 2,
     };
-    if trace.rows() > Bins::rows_within(trace, memory) {
+    if in_windows || trace.rows() > Bins::rows_within(trace, memory) {
         return Ok(None);
     }
     let mut bins = Bins::new(trace, trace.rows(), memory);

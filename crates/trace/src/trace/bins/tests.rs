@@ -258,7 +258,7 @@ fn kept_bins_are_the_last_traces_own_and_go_with_it() {
     assert!(stored.kept_bins().unwrap().is_none() && other.kept_bins().unwrap().is_some());
     stored.keep_bins(bins());
     assert!(other.kept_bins().unwrap().is_none());
-    stored.forget_bins();
+    Trace::forget_bins();
     assert!(stored.kept_bins().unwrap().is_none());
     let kept = bins();
     other.keep_bins(Arc::clone(&kept));
