@@ -84,7 +84,9 @@ fn whole(c: &mut Criterion) {
     for (name, trace) in traces() {
         group.throughput(Throughput::Elements(trace.rows()));
         let frame = Frame::of(&trace, SAMPLES, 1).expect("it has the samples");
-        let run = || replay(&Counting, &frame, &trace, &ReplayOptions::default()).expect("it runs");
+        // The file is read each time.
+        let options = ReplayOptions { keep: false, ..ReplayOptions::default() };
+        let run = || replay(&Counting, &frame, &trace, &options).expect("it runs");
         let counted = |replayed: &Replayed| -> u64 {
             let tiles =
                 (0..frame.grid.count() as u32).filter_map(|t| replayed.picture.tile(TileId(t)));

@@ -22,7 +22,7 @@ use crate::trace::Trace;
 /// Replay a trace through a design: a picture, its error, what the ROP did
 #[derive(Debug, Args)]
 #[command(mut_arg("memory", |memory| {
-    memory.help("MiB that the exact answer's fragments may take at a time")
+    memory.help("MiB that fragments may take that are sorted into tiles, and the exact answer's state; less takes more passes")
 }))]
 pub(super) struct Arguments {
     #[command(flatten)]
@@ -48,9 +48,10 @@ pub(super) struct Arguments {
     adapter: Option<String>,
     #[command(flatten)]
     memory: MemoryArgument,
-    /// Fragments that are binned at a time, at most
-    #[arg(long, default_value_t = 1 << 19, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=1 << 30))]
-    window: u64,
+    /// Fragments that are sorted into tiles at a time, at most; by default as many as fit into
+    /// the memory
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = clap::value_parser!(u64).range(1..=1 << 30))]
+    window: Option<u64>,
 }
 
 /// The result of one replay command.
@@ -104,7 +105,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     let watch = |done, total| progress.set(done, total);
     let options = ReplayOptions {
         count_events: true,
-        window: arguments.window as usize,
+        window: arguments.window.map_or(usize::MAX, |window| window as usize),
         memory: arguments.memory.bytes(),
         progress: &watch,
         ..ReplayOptions::default()

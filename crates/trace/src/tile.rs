@@ -91,8 +91,7 @@ impl<T> TileMap<T> {
     /// The value of `tile`, if it is touched.
     #[inline]
     pub fn get(&self, tile: TileId) -> Option<&T> {
-        let slot = self.slots[tile.0 as usize].checked_sub(1)?;
-        Some(&self.tiles[slot as usize].1)
+        Some(&self.tiles[self.slot(tile)?].1)
     }
 
     /// The place of `tile` among the touched ones, touching it with `make()`
@@ -105,6 +104,19 @@ impl<T> TileMap<T> {
             *slot = self.tiles.len() as u32;
         }
         *slot as usize - 1
+    }
+
+    /// The place of `tile` among the touched ones, if it is touched.
+    #[inline]
+    pub fn slot(&self, tile: TileId) -> Option<usize> {
+        self.slots[tile.0 as usize].checked_sub(1).map(|slot| slot as usize)
+    }
+
+    /// Makes all tiles untouched.
+    pub fn clear(&mut self) {
+        for (tile, _) in self.tiles.drain(..) {
+            self.slots[tile.0 as usize] = 0;
+        }
     }
 
     /// The value of `tile`, touching it with `make()` where it is new.

@@ -1,23 +1,11 @@
 //! Groups of tiles whose fragments fit into the memory limit, for designs whose
 //! state grows with the fragments.
 
-use std::ops::Range;
-
 use crate::contract::frame::Frame;
 use crate::replay::options::ReplayOptions;
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::tile::{TILE_PIXELS, TileGrid, TileId};
-use screendoor_trace::trace::{SampleMask, Trace};
-
-/// Tiles whose fragments are drawn together.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum Group {
-    Everything,
-    /// Tiles with numbers in a range.
-    Tiles(Range<u32>),
-    /// A range of one tile's pixels.
-    Part(TileId, Range<usize>),
-}
+use screendoor_trace::trace::{SampleMask, Tiles, Trace};
 
 /// Cuts the frame into groups whose fragments take at most the memory limit.
 pub(super) fn group_tiles(
@@ -25,10 +13,10 @@ pub(super) fn group_tiles(
     trace: &Trace,
     bytes_per_fragment: u64,
     options: &ReplayOptions<'_>,
-) -> Result<Vec<Group>> {
+) -> Result<Vec<Tiles>> {
     let limit = (options.memory / bytes_per_fragment).max(1);
     if trace.rows() <= limit {
-        return Ok(vec![Group::Everything]);
+        return Ok(vec![Tiles::All]);
     }
     let grid = frame.grid;
     let mut by_tile = vec![0_u64; grid.count()];
@@ -40,7 +28,7 @@ pub(super) fn group_tiles(
         let tile = tile as u32;
         if sum + n > limit {
             if sum > 0 {
-                groups.push(Group::Tiles(start..tile));
+                groups.push(Tiles::Range(start..tile));
             }
             (start, sum) = (tile, 0);
         }
@@ -64,16 +52,16 @@ pub(super) fn group_tiles(
                 ));
             }
             if in_part + n > limit {
-                groups.push(Group::Part(TileId(tile), first..within));
+                groups.push(Tiles::Part(TileId(tile), first..within));
                 (first, in_part) = (within, 0);
             }
             in_part += n;
         }
-        groups.push(Group::Part(TileId(tile), first..TILE_PIXELS));
+        groups.push(Tiles::Part(TileId(tile), first..TILE_PIXELS));
         start = tile + 1;
     }
     if sum > 0 {
-        groups.push(Group::Tiles(start..grid.count() as u32));
+        groups.push(Tiles::Range(start..grid.count() as u32));
     }
     Ok(groups)
 }

@@ -49,10 +49,14 @@ pub struct ReplayOptions<'a> {
     pub implementation: Implementation,
     /// Whether to count events.
     pub count_events: bool,
-    /// Fragments that are binned at a time, at most.
+    /// Fragments that are sorted into tiles at a time, at most, however many there is memory for.
     pub window: usize,
-    /// Bytes that the state of a design may take that grows with the fragments.
+    /// Bytes that the fragments may take, sorted into tiles, and the state of a design that
+    /// grows with them.
     pub memory: u64,
+    /// Whether fragments that were sorted for an earlier replay of the trace are drawn, and
+    /// are kept for the next where all fit into `memory`.
+    pub keep: bool,
     /// Is told how many fragments have been drawn, of how many.
     pub progress: &'a (dyn Fn(u64, u64) + Sync),
 }
@@ -62,8 +66,9 @@ impl Default for ReplayOptions<'_> {
         ReplayOptions {
             implementation: Implementation::Fast,
             count_events: false,
-            window: 1 << 19,
+            window: usize::MAX,
             memory: 1 << 29,
+            keep: true,
             progress: &|_, _| (),
         }
     }

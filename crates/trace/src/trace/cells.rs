@@ -1,4 +1,4 @@
-//! How a column's values are held: in a batch, while a batch is built, and in a block.
+//! How a column's values are held: in a batch, while a batch is built, and in bins.
 //!
 //! A column of one type holds it everywhere. Masks and colour channels are held in the
 //! width that the file gives them, and widened when they are read.
@@ -8,7 +8,7 @@ use std::fmt;
 use arrow_buffer::{Buffer, ScalarBuffer};
 use half::f16;
 
-use crate::trace::block::{Stretches, Values};
+use crate::trace::bins::{Binned, BinnedColumn, Copies, Rows, Slabs};
 use crate::trace::column::{Column, Native, Scalar, ValueType};
 use crate::trace::columns::ColumnKind;
 use crate::trace::fragment::SampleMask;
@@ -28,6 +28,8 @@ pub trait Cells: Sized {
     type Value: Copy + PartialEq + fmt::Debug;
     /// The column under construction.
     type Growing: fmt::Debug;
+    /// The column in bins.
+    type Binned: Binned<Self::Value>;
 
     /// The types it may have in a file whose pixels have `samples` samples.
     fn accepts(value_type: ValueType, samples: u32) -> bool;
@@ -48,8 +50,10 @@ pub trait Cells: Sized {
     fn push(growing: &mut Self::Growing, value: Self::Value) -> bool;
     /// The values so far; the growing column is empty after.
     fn take(growing: &mut Self::Growing) -> Self;
-    /// Copies rows to a block, masks as far as they lie within `mask`.
-    fn copy(&self, from: Stretches<'_>, to: &mut Values<Self::Value>, mask: SampleMask);
+    /// The column in bins that have no rows yet.
+    fn binned(&self) -> Self::Binned;
+    /// Copies rows to bins.
+    fn bin(&self, to: &Self::Binned, slabs: &mut Slabs, copies: &Copies);
 }
 
 impl<T: Native> Cells for Column<T> {
@@ -59,6 +63,7 @@ impl<T: Native> Cells for Column<T> {
     };
     type Value = T;
     type Growing = Growing<T>;
+    type Binned = BinnedColumn<T>;
 
     fn accepts(value_type: ValueType, _: u32) -> bool {
         value_type == T::TYPE
@@ -126,10 +131,28 @@ impl<T: Native> Cells for Column<T> {
         }
     }
 
+    fn binned(&self) -> BinnedColumn<T> {
+        BinnedColumn::like(self)
+    }
+
+    fn bin(&self, to: &BinnedColumn<T>, slabs: &mut Slabs, copies: &Copies) {
+        to.put(self, slabs, copies);
+    }
+}
+
+impl<T: Native> Binned<T> for BinnedColumn<T> {
+    fn bytes(&self) -> usize {
+        BinnedColumn::bytes(self)
+    }
+
+    fn place(&mut self, before: usize) {
+        BinnedColumn::place(self, before);
+    }
+
     #[inline(always)]
-    fn copy(&self, from: Stretches<'_>, to: &mut Values<T>, _: SampleMask) {
-        from.put(
-            self,
+    fn read(&self, from: (&Slabs, Rows), to: &mut [T], _: SampleMask) {
+        self.get(
+            from,
             to,
             #[inline(always)]
             |v| v,
@@ -217,7 +240,7 @@ fn widen(value: f16) -> f32 {
 macro_rules! either {
     (
         $(#[$meta:meta])*
-        $name:ident, $growing:ident of $wide:ty, $kind:ident:
+        $name:ident, $growing:ident, $binned:ident of $wide:ty, $kind:ident:
         $($variant:ident($native:ty)),+; widest $last:ident;
         accepts ($type:ident, $samples:ident) => $accepts:expr;
         copied ($value:ident, $mask:ident) => $copied:expr
@@ -240,6 +263,7 @@ macro_rules! either {
             const KIND: ColumnKind = ColumnKind::$kind;
             type Value = $wide;
             type Growing = $growing;
+            type Binned = $binned;
 
             fn accepts($type: ValueType, $samples: u32) -> bool {
                 $accepts
@@ -303,21 +327,58 @@ macro_rules! either {
                 }
             }
 
+            fn binned(&self) -> $binned {
+                match self {
+                    $($name::$variant(column) => $binned::$variant(column.binned()),)+
+                    $name::$last(column) => $binned::$last(column.binned()),
+                }
+            }
+
+            fn bin(&self, to: &$binned, slabs: &mut Slabs, copies: &Copies) {
+                match (self, to) {
+                    $(($name::$variant(column), $binned::$variant(to)) => to.put(column, slabs, copies),)+
+                    ($name::$last(column), $binned::$last(to)) => to.put(column, slabs, copies),
+                    _ => unreachable!("a column has one type in all of a trace's batches"),
+                }
+            }
+        }
+
+        #[derive(Debug)]
+        pub enum $binned {
+            $($variant(BinnedColumn<$native>),)+
+            $last(BinnedColumn<$wide>),
+        }
+
+        impl Binned<$wide> for $binned {
+            fn bytes(&self) -> usize {
+                match self {
+                    $($binned::$variant(column) => column.bytes(),)+
+                    $binned::$last(column) => column.bytes(),
+                }
+            }
+
+            fn place(&mut self, before: usize) {
+                match self {
+                    $($binned::$variant(column) => column.place(before),)+
+                    $binned::$last(column) => column.place(before),
+                }
+            }
+
             #[inline(always)]
-            fn copy(&self, from: Stretches<'_>, to: &mut Values<$wide>, mask: SampleMask) {
+            fn read(&self, from: (&Slabs, Rows), to: &mut [$wide], mask: SampleMask) {
                 #[inline(always)]
                 fn copied($value: $wide, $mask: SampleMask) -> $wide {
                     $copied
                 }
                 match self {
-                    $($name::$variant(column) => from.put(
-                        column,
+                    $($binned::$variant(column) => column.get(
+                        from,
                         to,
                         #[inline(always)]
                         |v| copied(v.wide(), mask),
                     ),)+
-                    $name::$last(column) => from.put(
-                        column,
+                    $binned::$last(column) => column.get(
+                        from,
                         to,
                         #[inline(always)]
                         |v| copied(v, mask),
@@ -330,14 +391,14 @@ macro_rules! either {
 
 either! {
     /// Coverage masks in the narrowest type that the file gives them.
-    CoverageColumn, GrowingCoverage of u64, Mask: U8(u8), U16(u16), U32(u32); widest U64;
+    CoverageColumn, GrowingCoverage, BinnedCoverage of u64, Mask: U8(u8), U16(u16), U32(u32); widest U64;
     accepts (t, samples) => t.is_unsigned() && t.bytes() as u32 * 8 >= samples;
     copied (value, mask) => value & mask.0
 }
 
 either! {
     /// A colour channel in half or single precision.
-    ChannelColumn, GrowingChannel of f32, Real: F16(f16); widest F32;
+    ChannelColumn, GrowingChannel, BinnedChannel of f32, Real: F16(f16); widest F32;
     accepts (t, _samples) => matches!(t, ValueType::F16 | ValueType::F32);
     copied (value, _mask) => value
 }

@@ -131,6 +131,8 @@ pub trait Native: ArrowNativeType + PartialEq + std::str::FromStr {
     fn scalar(self) -> Scalar;
     /// A scalar as a value; `None` where it is of another kind or does not fit.
     fn from_scalar(scalar: Scalar) -> Option<Self>;
+    /// The value with these bytes, as many as it takes.
+    fn from_bytes(bytes: &[u8]) -> Self;
 }
 
 macro_rules! native {
@@ -148,6 +150,10 @@ macro_rules! native {
                     Scalar::$variant($v) => $from,
                     _ => None,
                 }
+            }
+            #[inline(always)]
+            fn from_bytes(bytes: &[u8]) -> Self {
+                Self::from_le_bytes(bytes.try_into().expect("as many as it takes"))
             }
         })+
     };

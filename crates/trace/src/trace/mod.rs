@@ -10,6 +10,7 @@
 compile_error!("traces are little-endian and are read without conversion");
 
 mod batch;
+mod bins;
 mod block;
 mod cells;
 mod column;
@@ -34,8 +35,8 @@ mod view;
 mod write;
 
 pub use batch::{Batch, MAX_BATCH_ROWS};
+pub use bins::{Bins, RowPlace, TileRows, Tiles, Wanted};
 pub use block::{BLOCK, Block};
-pub use block::{STRETCH, Stretch};
 pub use cells::{ChannelColumn, CoverageColumn};
 pub use column::{Column, Native, Scalar, ValueType};
 pub use columns::{ColumnId, ColumnKind, ColumnSet, OptionalValues};

@@ -15,6 +15,7 @@ use serde::Serialize;
 use crate::error::{Error, Result};
 use crate::param::Options;
 use crate::trace::batch::Batch;
+use crate::trace::bins::Kept;
 use crate::trace::cells::Source;
 use crate::trace::column::ValueType;
 use crate::trace::columns::ColumnId;
@@ -54,6 +55,7 @@ struct Inner {
     seal: Option<Seal>,
     /// Whether there is an opaque fragment, once somebody asked.
     opaque: OnceLock<bool>,
+    kept: Arc<Kept>,
 }
 
 /// What a trace's checksums cover.
@@ -208,6 +210,7 @@ impl Trace {
             rows,
             seal,
             opaque: OnceLock::new(),
+            kept: Arc::default(),
         };
         Ok(Trace { inner: Arc::new(inner) })
     }
@@ -360,6 +363,16 @@ impl Trace {
         let codec = self.stored_batch(0)?.0.compression;
         let known = Compression::ALL.iter().copied().find(|known| known.codec() == codec);
         Ok(known.unwrap_or(Compression::None))
+    }
+
+    /// Where its bins are kept.
+    pub(super) fn kept(&self) -> &Arc<Kept> {
+        &self.inner.kept
+    }
+
+    /// Refuses a file that was written to since it was opened.
+    pub(super) fn check_unchanged(&self) -> Result<()> {
+        self.inner.storage.changed(&self.inner.place).map_or(Ok(()), Err)
     }
 
     /// All batches in order.
