@@ -79,17 +79,22 @@ fn exact(c: &mut Criterion) {
 }
 
 fn lk(c: &mut Criterion) {
-    let works = [("draw", Work::Draw), ("count", Work::Count)];
+    let works = [
+        ("picture", Work::Picture),
+        ("draw", Work::Draw),
+        ("blocks", Work::Blocks),
+        ("count", Work::Count),
+    ];
     bench(c, "lk", &[8], &works);
     bench(c, "lk", &[1, 2, 4, 16, 32, 64], &works[..1]);
 }
 
 fn systematic(c: &mut Criterion) {
-    bench(c, "systematic", &[8], &[("draw", Work::Draw)]);
+    bench(c, "systematic", &[8], &[("picture", Work::Picture)]);
 }
 
 fn enderton(c: &mut Criterion) {
-    bench(c, "enderton", &[8], &[("draw", Work::Draw)]);
+    bench(c, "enderton", &[8], &[("picture", Work::Picture)]);
 }
 
 criterion_group! {

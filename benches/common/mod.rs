@@ -9,7 +9,8 @@ use std::time::{Duration, Instant};
 
 use screendoor::capture::{Capture, CaptureOptions};
 use screendoor::param::Options;
-use screendoor::rop::{BlockList, EventCounts, Frame, Implementation, Listener, TileState, TiledDesign};
+use screendoor::picture::TilePixels;
+use screendoor::rop::{BlockList, EventCounts, Frame, Implementation, Listener, TiledDesign};
 use screendoor::tile::TileId;
 use screendoor::trace::{Block, Compression, SampleMask, Trace, TraceWriter, WriteOptions};
 
@@ -77,47 +78,56 @@ pub fn binned(trace: &Trace, frame: &Frame) -> (Vec<Tile>, usize) {
 /// Which parts of an engine's work are timed.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Work {
-    /// Clearing and drawing: the kernel.
-    Draw,
+    /// Clearing, drawing and resolving, as a replay has it done: the kernel.
+    Picture,
     /// The same, with events counted.
     Count,
-    /// Clearing, drawing and resolving.
-    Picture,
+    /// Clearing and drawing into a tile's state, all of its fragments at once.
+    Draw,
+    /// The same, a block at a time: what does not pay for all at once is not done.
+    Blocks,
 }
 
-/// Draws a tile; the time that it took. A replay has just copied a block when it is drawn:
-/// here, too, it is copied first, which is not timed.
+/// Draws a tile; its colours, and the time that it took. A replay has just copied a block when
+/// it is drawn: here, too, they are copied first, which is not timed.
 pub fn draw(
     engine: &dyn TiledDesign,
     frame: &Frame,
     (tile, blocks): &Tile,
     work: Work,
-) -> (TileState, Duration) {
+) -> (TilePixels, Duration) {
     let mut events = EventCounts::default();
+    let near = black_box(blocks.clone());
+    let resolved = matches!(work, Work::Picture | Work::Count);
     let start = Instant::now();
+    if resolved && engine.passes() == 1 {
+        let told = told(&mut events, work);
+        let mut list = BlockList::new(&near);
+        if let Some(pixels) = engine.picture(frame.grid, *tile, &mut list, told) {
+            return (pixels, start.elapsed());
+        }
+    }
     let mut state = engine.clear(frame.grid, *tile);
-    let mut time = start.elapsed();
-    let mut near = Block::default();
     for pass in 0..engine.passes() {
-        let near = black_box(blocks.clone());
-        let told = match work {
-            Work::Count => Listener::Counts(&mut events),
-            Work::Draw | Work::Picture => Listener::Nobody,
-        };
-        let start = Instant::now();
-        engine.draw_blocks(pass, &mut state, &mut BlockList::new(&near), told);
-        time += start.elapsed();
-        let start = Instant::now();
+        if work == Work::Blocks {
+            for block in &near {
+                engine.draw(pass, &mut state, block, Listener::Nobody);
+            }
+        } else {
+            let told = told(&mut events, work);
+            engine.draw_blocks(pass, &mut state, &mut BlockList::new(&near), told);
+        }
         engine.end_pass(pass, frame.grid, *tile, &mut state, Listener::Nobody);
-        time += start.elapsed();
     }
-    if work == Work::Picture {
-        let start = Instant::now();
-        black_box(engine.resolve(frame.grid, *tile, &state));
-        time += start.elapsed();
-    }
+    let drawn = start.elapsed();
+    let pixels = engine.resolve(frame.grid, *tile, &state);
+    let time = if resolved { start.elapsed() } else { drawn };
     black_box(events);
-    (state, time)
+    (pixels, time)
+}
+
+fn told(events: &mut EventCounts, work: Work) -> Listener<'_> {
+    if work == Work::Count { Listener::Counts(events) } else { Listener::Nobody }
 }
 
 /// The time that all tiles take, one after the other.
@@ -125,14 +135,16 @@ pub fn draw_all(engine: &dyn TiledDesign, frame: &Frame, tiles: &[Tile], work: W
     tiles.iter().map(|tile| black_box(draw(engine, frame, tile, work)).1).sum()
 }
 
-/// Panics where two engines do not agree to the last bit.
+/// Panics where two engines do not agree to the last bit, or one with itself.
 pub fn assert_same(a: &dyn TiledDesign, b: &dyn TiledDesign, frame: &Frame, tiles: &[Tile]) {
     for tile in tiles {
-        let [a, b] = [a, b].map(|engine| {
-            let (state, _) = draw(engine, frame, tile, Work::Draw);
-            engine.resolve(frame.grid, tile.0, &state).map(|colour| colour.map(f64::to_bits))
-        });
-        assert_eq!(a, b, "engines differ in {:?}", tile.0);
+        let works = [Work::Picture, Work::Count, Work::Draw, Work::Blocks];
+        let pixels = works.map(|work| draw(a, frame, tile, work).0).into_iter();
+        let bits = |pixels: TilePixels| pixels.map(|colour| colour.map(f64::to_bits));
+        let expected = bits(draw(b, frame, tile, Work::Draw).0);
+        for pixels in pixels {
+            assert_eq!(bits(pixels), expected, "engines differ in {:?}", tile.0);
+        }
     }
 }
 

@@ -147,8 +147,7 @@ fn check(name: &str, samples: u32, cases: u32, at_once: bool) {
     for (i, design) in variants(entry).into_iter().enumerate() {
         for case in 0..cases {
             let seed = case * 1000 + i as u32;
-            let fragments =
-                if at_once { throng(&header, seed) } else { crowd(&header, 60, seed) };
+            let fragments = if at_once { throng(&header, seed) } else { crowd(&header, 60, seed) };
             let frame = design.frame(&empty, samples, seed).unwrap();
             let expected = run(&design, &frame, Implementation::Reference, &fragments, at_once);
             for implementation in engines() {

@@ -1,12 +1,14 @@
 //! The choice of samples in lanes.
 
-use fearless_simd::Simd;
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, i32x16, mask32x16, u32x16};
 
-use crate::enderton::{Among, EndertonSampler, MaskRule, Words};
+use crate::enderton::{Among, EndertonSampler, MaskRule, SeedBy, Words, pixel_word};
 use screendoor_rop::fast::{
-    FastSampler, Lanes, Loaded, Offered, OneByOne, Tally, below, picked, ranks_of_distinct,
+    Abreast, Counted, FastSampler, Lanes, Loaded, Met, Offered, Ranks, Source, Tally, below, bit,
+    gather, left_by, mixed, picked, ranks_of_distinct, stride,
 };
-use screendoor_rop::{Probe, Round, Samples};
+use screendoor_rop::{Dither, Probe, Round, Samples, Site};
 use screendoor_trace::random::{GOLDEN, MIX, hash};
 use screendoor_trace::tile::{TILE_PIXELS, TileGrid, TileId};
 use screendoor_trace::trace::MAX_SAMPLES;
@@ -34,16 +36,27 @@ impl<const N: usize> FastEnderton<N> {
 
 impl<const N: usize> FastSampler<N> for FastEnderton<N> {
     type Plain = EndertonSampler<N>;
-    type State = ();
-    type Abreast = OneByOne<()>;
+    /// The pixel, as it is hashed.
+    type State = u32;
+    type Abreast = Self;
 
-    fn clear(&self, _: TileGrid, _: TileId) -> Vec<()> {
-        vec![(); TILE_PIXELS]
+    fn abreast(&self) -> Option<&Self> {
+        // ξ of the others is looked up.
+        (self.naive || self.plain.dither == Dither::White).then_some(self)
     }
 
-    fn to_plain(&self, (): ()) {}
-    fn of_plain(&self, (): &(), _: &Samples<N>, (): &mut ()) {}
-    fn enter(&self, _: &Round, _: &mut [(); TILE_PIXELS]) {}
+    fn clear(&self, grid: TileGrid, tile: TileId) -> Vec<u32> {
+        let pixel = |within| {
+            // Beyond a frame of full size this wraps; such pixels are never drawn to.
+            let (x, y) = grid.pixel(tile, within);
+            pixel_word(Site { x: x as u16, y: y as u16 })
+        };
+        (0..TILE_PIXELS).map(pixel).collect()
+    }
+
+    fn to_plain(&self, _: u32) {}
+    fn of_plain(&self, (): &(), _: &Samples<N>, _: &mut u32) {}
+    fn enter(&self, _: &Round, _: &mut [u32; TILE_PIXELS]) {}
 
     #[inline(always)]
     fn depth_bits(&self) -> u32 {
@@ -60,7 +73,7 @@ impl<const N: usize> FastSampler<N> for FastEnderton<N> {
         &self,
         simd: S,
         loaded: &Loaded<L>,
-        (): &mut (),
+        _: &mut u32,
         offered: Offered<'_, L>,
         tally: &mut Tally<'_, P>,
     ) -> L::Mask {
@@ -88,6 +101,92 @@ impl<const N: usize> FastSampler<N> for FastEnderton<N> {
         keys.store(&mut list[..L::LEN]);
         let ranks = ranks_of_distinct(simd, keys, &list, from);
         picked(simd, hits, ranks, L::mask(simd, from & passed))
+    }
+}
+
+impl<const N: usize> Abreast<N> for FastEnderton<N> {
+    type Kept = u32;
+    /// What the words of a pixel's fragments have in common.
+    type Lanes<S: Simd> = u32x16<S>;
+
+    fn source(&self) -> Source {
+        match self.plain.seed_by {
+            SeedBy::Primitive => Source::Primitive,
+            SeedBy::Object => Source::Object,
+            SeedBy::Depth => Source::Depth,
+        }
+    }
+
+    #[inline(always)]
+    fn load<S: Simd>(
+        &self,
+        simd: S,
+        round: &Round,
+        kept: &[u32; TILE_PIXELS],
+        pixels: &[u8; 16],
+    ) -> u32x16<S> {
+        gather(simd, pixels, |p| hash([round.seed, kept[p]]))
+    }
+
+    #[inline(always)]
+    fn store<S: Simd>(&self, _: &u32x16<S>, _: &mut [u32; TILE_PIXELS], _: &[u8; 16]) {}
+
+    #[inline(always)]
+    fn choose<S: Simd, P: Probe>(
+        &self,
+        simd: S,
+        lanes: &mut u32x16<S>,
+        met: &Met<'_, S, N>,
+        counted: &mut Counted<S, P>,
+    ) -> [mask32x16<S>; N] {
+        let word = |word: u32| u32x16::splat(simd, word);
+        let none = word(0);
+        let some = met.passed.simd_gt(none);
+        let from = match self.plain.among {
+            Among::Passed => met.passed,
+            Among::Covered => some.select(met.coverage, none),
+        };
+        let count = from.count_ones();
+        let before = mixed(simd, (*lanes ^ met.source) + word(GOLDEN));
+        let of = |place: u32| mixed(simd, (before ^ word(place)) + word(GOLDEN));
+        let mut words = [none; N];
+        for s in 0..N {
+            words[s] = of(s as u32);
+        }
+        if self.naive {
+            counted.hashed(count);
+            let mut written = *met.passes;
+            for s in 0..N {
+                written[s] = written[s] & (words[s].simd_lt(met.threshold) | met.opaque);
+            }
+            return written;
+        }
+        counted.hashed(some.select(count + word(1), none));
+        // ⌊α·count + ξ⌋, in halves that 32 bits hold.
+        let (xi, half) = (of(N as u32), word(0xffff));
+        let low = (met.threshold & half) * count + (xi & half);
+        let high = (met.threshold >> 16) * count + (xi >> 16);
+        let chosen = met.opaque.select(count, (high + (low >> 16)) >> 16);
+        // The first so many numbers.
+        let all = (0..N).fold(0, |all, n| all | bit(N, n));
+        let beyond = left_by(simd, word(all), chosen * word(stride(N)));
+        let hits = !beyond & word(all);
+        // Words in the order of signed numbers; of samples that are not among them, more than
+        // any or as much.
+        let signed = |word: u32x16<S>| word.bitcast::<i32x16<S>>();
+        let [mut keys, mut others] = [[i32x16::splat(simd, i32::MAX); N]; 2];
+        let mut outside = [some; N];
+        for s in 0..N {
+            keys[s] = signed(words[s] ^ word(1 << 31));
+            outside[s] = (from & word(bit(N, s))).simd_eq(none);
+            others[s] = outside[s].select(others[s], keys[s]);
+        }
+        let ranks = Ranks::<S, N>::by(
+            simd,
+            #[inline(always)]
+            |i, j| keys[i].simd_gt(others[j]) | outside[i],
+        );
+        ranks.picked(simd, hits, met.passed)
     }
 }
 

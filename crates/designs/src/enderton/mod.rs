@@ -191,6 +191,11 @@ struct Words {
     source: u32,
 }
 
+/// A pixel as it is hashed.
+fn pixel_word(site: Site) -> u32 {
+    u32::from(site.y) << 16 | u32::from(site.x)
+}
+
 impl Words {
     fn word(&self, place: u32) -> u32 {
         hash([self.seed, self.pixel, self.source, place])
@@ -215,7 +220,7 @@ impl<const N: usize> EndertonSampler<N> {
     fn words(&self, round: Round, site: Site, fragment: &Fragment) -> Words {
         Words {
             seed: round.seed,
-            pixel: u32::from(site.y) << 16 | u32::from(site.x),
+            pixel: pixel_word(site),
             // The random words belong to what the fragment is part of, so that it is
             // treated alike wherever it stands in the stream.
             source: match self.seed_by {

@@ -10,8 +10,8 @@ use crate::residual::errors::{
 };
 use crate::residual::{ResidualSampler, Residue};
 use screendoor_rop::fast::{
-    self, Count, FastSampler, Lanes, Loaded, Offered, OneByOne, Tally, below, in_sample_order, picked, ranks,
-    teeth,
+    self, Count, FastSampler, Lanes, Loaded, Offered, OneByOne, Tally, below, in_sample_order,
+    picked, ranks, teeth,
 };
 use screendoor_rop::stochastic::comb::exchanges;
 use screendoor_rop::{Dither, PixelIndex, Probe, ReferenceKey, Round, Samples};

@@ -116,6 +116,12 @@ fn draw_tile(
         if !blocks.any() {
             return (None, counts);
         }
+        if design.passes() == 1 {
+            let listener = counts.as_mut().map_or(Listener::Nobody, Listener::Counts);
+            if let Some(pixels) = design.picture(frame.grid, tile, &mut blocks, listener) {
+                return (Some(pixels), counts);
+            }
+        }
         let state = state.get_or_insert_with(|| design.clear(frame.grid, tile));
         let mut listener = counts.as_mut().map_or(Listener::Nobody, Listener::Counts);
         design.draw_blocks(pass, state, &mut blocks, listener.again());

@@ -25,8 +25,8 @@ mod twin;
 
 pub use crate::lanes::{Count, Lanes, Width, levels};
 pub use abreast::{
-    Abreast, Counted, Met, NumberedAbreast, OneByOne, Ranks, Source, bit, gather, mixed, right_by,
-    words_of,
+    Abreast, Counted, Met, NumberedAbreast, OneByOne, Ranks, Source, bit, gather, left_by, mixed,
+    stride,
 };
 pub use comb::teeth;
 pub use limit::{Limit, below};

@@ -8,10 +8,10 @@ use crate::contract::frame::Frame;
 use crate::lanes::{Count, Width};
 use crate::resolve::box_filter;
 use crate::stochastic::fast::abreast::lists::{COVERED, Group, LANES, Row, words};
+use crate::stochastic::fast::abreast::met::words_of;
 use crate::stochastic::fast::abreast::met::{Abreast, Counted, Met};
 use crate::stochastic::fast::abreast::packed::{bit, packed, unpack};
 use crate::stochastic::fast::abreast::window::{NOBODY, OPAQUE, STEEP, Window};
-use crate::stochastic::fast::abreast::words_of;
 use crate::stochastic::fast::sampler::FastSampler;
 use crate::stochastic::fast::state::{FastTile, SIGN};
 use crate::stochastic::fast::tally::Tally;
@@ -55,7 +55,14 @@ pub(in crate::stochastic::fast) fn draw<S, F, A, P, const N: usize>(
         let pixels = group.pixels;
         let mut held = Held::<S, N>::load(simd, tile, pixels);
         let mut lanes = sampler.load(simd, &round, &tile.states, pixels);
-        let all = Rounds { engine, sampler, round: &round, depths: &depths, several };
+        let all = Rounds {
+            #[cfg(test)]
+            flaw: engine.flaw,
+            sampler,
+            round: &round,
+            depths: &depths,
+            several,
+        };
         let occupied = all.draw(simd, group, &mut held, &mut lanes, &mut tally);
         held.store(tile, pixels);
         sampler.store(&lanes, &mut tile.states, pixels);
@@ -104,7 +111,14 @@ where
     for group in window.lists.groups() {
         let mut held = Held::<S, N>::cleared(simd);
         let mut lanes = sampler.load(simd, &round, states, group.pixels);
-        let all = Rounds { engine, sampler, round: &round, depths: &depths, several: false };
+        let all = Rounds {
+            #[cfg(test)]
+            flaw: engine.flaw,
+            sampler,
+            round: &round,
+            depths: &depths,
+            several: false,
+        };
         all.draw(simd, group, &mut held, &mut lanes, &mut tally);
         let mut winners = [[0; LANES]; N];
         for s in 0..N {
@@ -187,11 +201,9 @@ fn tell<F: FastSampler<N>, P: Sum, const N: usize>(
 }
 
 /// What all rounds have in common.
-struct Rounds<'a, S: Simd, F: FastSampler<N>, A, const N: usize>
-where
-    Count<N>: Width,
-{
-    engine: &'a FastEngine<F, N>,
+struct Rounds<'a, S: Simd, A, const N: usize> {
+    #[cfg(test)]
+    flaw: Option<Flaw>,
     sampler: &'a A,
     round: &'a Round,
     depths: &'a Depths<'a, S, N>,
@@ -199,10 +211,7 @@ where
     several: bool,
 }
 
-impl<S: Simd, F: FastSampler<N>, A: Abreast<N>, const N: usize> Rounds<'_, S, F, A, N>
-where
-    Count<N>: Width,
-{
+impl<S: Simd, A: Abreast<N>, const N: usize> Rounds<'_, S, A, N> {
     /// Draws a group's fragments; the samples that were written.
     #[inline(always)]
     fn draw<P: Sum>(
@@ -219,7 +228,7 @@ where
             let step = Step { group, rows, number };
             let drawn = self.step(simd, held, &step, lanes, &mut counted);
             #[cfg(test)]
-            let drawn = flawed(simd, self.engine.flaw, drawn);
+            let drawn = flawed(simd, self.flaw, drawn);
             held.write(&drawn);
             if P::LISTENS || self.several {
                 let written = drawn.set(simd);
@@ -344,7 +353,9 @@ where
             }
         }
     }
+}
 
+impl<S: Simd, const N: usize> Held<S, N> {
     /// Samples that nothing was written to.
     #[inline(always)]
     fn cleared(simd: S) -> Self {

@@ -17,11 +17,11 @@ use crate::stochastic::reference_value::LK2011;
 
 /// Thresholds of sixteen pixels.
 #[derive(Clone, Copy)]
-pub struct Limits<S: Simd> {
+pub(in crate::stochastic::fast) struct Limits<S: Simd> {
     /// Modulo 2^32.
-    pub(in crate::stochastic::fast) threshold: u32x16<S>,
+    pub threshold: u32x16<S>,
     /// Where it is 2^32.
-    pub(in crate::stochastic::fast) opaque: mask32x16<S>,
+    pub opaque: mask32x16<S>,
 }
 
 impl<S: Simd> Limits<S> {

@@ -98,7 +98,7 @@ pub fn gather<S: Simd>(simd: S, pixels: &[u8; 16], word: impl Fn(usize) -> u32) 
 
 /// The words of a vector.
 #[inline(always)]
-pub fn words_of<S: Simd>(vector: u32x16<S>) -> [u32; 16] {
+pub(super) fn words_of<S: Simd>(vector: u32x16<S>) -> [u32; 16] {
     let mut words = [0; 16];
     vector.store_slice(&mut words);
     words

@@ -23,8 +23,8 @@ use fearless_simd::{Simd, u32x16};
 
 pub(super) use draw::{add, draw, picture};
 pub(super) use hits::nested;
-pub use met::{Abreast, Counted, Met, Source, gather, words_of};
-pub use packed::{Ranks, bit, right_by};
+pub use met::{Abreast, Counted, Met, Source, gather};
+pub use packed::{Ranks, bit, left_by, stride};
 use screendoor_trace::random::MIX;
 pub use tracked::NumberedAbreast;
 pub(super) use tracked::from_first;

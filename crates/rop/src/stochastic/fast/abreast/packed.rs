@@ -9,7 +9,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, i32x16, mask32x16, u32x16};
 
 /// Bits between a sample and the next.
-pub(super) const fn stride(samples: usize) -> u32 {
+pub const fn stride(samples: usize) -> u32 {
     if samples <= 8 { 4 } else { 1 }
 }
 
@@ -67,13 +67,13 @@ pub(super) fn packed<S: Simd, const N: usize>(simd: S, mask: u32x16<S>) -> u32x1
 ///
 /// The instructions of AVX-512, AVX2 and NEON all have it so, which a test holds them to.
 #[inline(always)]
-pub fn right_by<S: Simd>(simd: S, word: u32x16<S>, by: u32x16<S>) -> u32x16<S> {
+pub(super) fn right_by<S: Simd>(simd: S, word: u32x16<S>, by: u32x16<S>) -> u32x16<S> {
     simd.shrv_u32x16(word, by)
 }
 
 /// Shifted left by the other lane; nothing is left of a word that is shifted by 32 to 60 bits.
 #[inline(always)]
-pub(super) fn left_by<S: Simd>(simd: S, word: u32x16<S>, by: u32x16<S>) -> u32x16<S> {
+pub fn left_by<S: Simd>(simd: S, word: u32x16<S>, by: u32x16<S>) -> u32x16<S> {
     simd.shlv_u32x16(word, by)
 }
 

@@ -18,7 +18,7 @@ use crate::stochastic::fast::abreast::hits::Limits;
 use crate::stochastic::fast::abreast::packed::{
     Ranks, all, bit, left_by, pack, packed, right_by, unpack,
 };
-use crate::stochastic::fast::abreast::{nested, words_of};
+use crate::stochastic::fast::abreast::{met::words_of, nested};
 use crate::stochastic::fast::tests::{PARAMS, frame};
 use crate::stochastic::single_pass;
 use crate::tracked::{Hashed, REFERENCE, TrackedSampler};
