@@ -1,7 +1,12 @@
 //! The drawing of a chunk of primitives, cut into jobs that threads do.
 
+use fearless_simd::{Level, Simd, dispatch};
+
+use crate::capture::batch::Batch;
 use crate::capture::geometry::{Splat, Triangle};
-use crate::capture::raster::Raster;
+use crate::capture::raster::{Bounds, Raster};
+use crate::capture::samples::Samples;
+use crate::capture::scan::Scan;
 use crate::capture::setup::ScreenTriangle;
 use crate::capture::shade::Shader;
 use crate::capture::splat::{Nothing, OnFrame, Painter, Placed, SplatRules};
@@ -19,8 +24,10 @@ pub(super) struct Tools<'a> {
     /// Each object's place, for its splats.
     pub(super) placed: Vec<Placed>,
     pub(super) rules: &'a SplatRules,
-    /// The samples' places from the pixel's centre, in sub-pixel steps and in pixels.
-    pub(super) steps: Vec<[i64; 2]>,
+    /// The instructions that there are.
+    pub(super) level: Level,
+    pub(super) samples: Samples,
+    /// The samples' places from the pixel's centre, in pixels.
     pub(super) pixels: Vec<[f64; 2]>,
     /// The frame's, in pixels.
     pub(super) size: [u32; 2],
@@ -32,7 +39,7 @@ impl Tools<'_> {
     }
 
     pub(super) fn raster<'p>(&'p self, piece: &'p ScreenTriangle) -> Raster<'p> {
-        Raster::new(piece, &self.steps, self.size)
+        Raster::new(piece, &self.samples, self.size)
     }
 }
 
@@ -57,46 +64,43 @@ struct Extent {
 }
 
 impl Drawn {
-    /// The extent of each piece.
-    fn extents(&self, tools: &Tools<'_>) -> Vec<Extent> {
+    /// Tells the extent of each piece.
+    fn extents(&self, tools: &Tools<'_>, mut tell: impl FnMut(Extent)) {
         match self {
-            Drawn::Triangle { pieces, .. } => {
-                let extent = |piece| {
-                    let raster = tools.raster(piece);
-                    Extent { rows: raster.rows(), columns: raster.columns() }
-                };
-                pieces.iter().map(extent).collect()
+            Drawn::Triangle { pieces, .. } => pieces.iter().for_each(|piece| {
+                let bounds = Bounds::new(piece, tools.size);
+                tell(Extent { rows: bounds.rows(), columns: bounds.width() });
+            }),
+            Drawn::Splat { on_frame: Ok(s), .. } => {
+                tell(Extent { rows: s.rows(), columns: s.columns() });
             }
-            Drawn::Splat { on_frame, .. } => {
-                let extent = |s: &OnFrame| Extent { rows: s.rows(), columns: s.columns() };
-                on_frame.iter().map(extent).collect()
-            }
+            Drawn::Splat { on_frame: Err(_), .. } => {}
         }
     }
 
     /// Its fragments in some rows of a piece.
-    fn fragments(&self, part: &Part, tools: &Tools<'_>, fragments: &mut Vec<Fragment>) {
+    #[inline(always)]
+    fn fragments<S: Simd>(
+        &self,
+        simd: S,
+        part: &Part,
+        tools: &Tools<'_>,
+        fragments: &mut Vec<Fragment>,
+    ) {
         match self {
             Drawn::Triangle { triangle, pieces } => {
                 let raster = tools.raster(&pieces[part.piece]);
+                let scan = Scan::new(simd, &raster);
+                let mut batch = Batch::new(&raster, triangle, &tools.shader);
                 for y in part.rows.0..=part.rows.1 {
-                    raster.row(y, |hit| {
-                        let weights = raster.weights(hit.shade_at);
-                        let shaded = tools.shader.shade(triangle, &weights);
-                        let Some((colour, alpha)) = shaded else { return };
-                        fragments.push(Fragment {
-                            x: hit.x,
-                            y: hit.y,
-                            coverage: hit.coverage,
-                            depth: hit.depth,
-                            colour,
-                            alpha,
-                            primitive: triangle.primitive,
-                            object: triangle.object,
-                            ..Fragment::default()
-                        });
-                    });
+                    scan.row(
+                        simd,
+                        y,
+                        #[inline(always)]
+                        |covered| batch.add(simd, y, covered, fragments),
+                    );
                 }
+                batch.finish(simd, fragments);
             }
             Drawn::Splat { on_frame, object, primitive } => {
                 let Ok(splat) = on_frame else { return };
@@ -131,7 +135,8 @@ struct Part {
 pub(super) fn cut_into_jobs(drawn: &[Drawn], tools: &Tools<'_>) -> Vec<Job> {
     let mut jobs = vec![Job::default()];
     for (i, d) in drawn.iter().enumerate() {
-        for (k, extent) in d.extents(tools).into_iter().enumerate() {
+        let mut piece = 0;
+        d.extents(tools, |extent| {
             let (mut row, last) = extent.rows;
             let columns = extent.columns;
             while row <= last {
@@ -142,11 +147,12 @@ pub(super) fn cut_into_jobs(drawn: &[Drawn], tools: &Tools<'_>) -> Vec<Job> {
                 }
                 let room = ((JOB_PIXELS - job.pixels) / columns).max(1);
                 let end = (row + room - 1).min(last);
-                job.parts.push(Part { drawn: i, piece: k, rows: (row, end) });
+                job.parts.push(Part { drawn: i, piece, rows: (row, end) });
                 job.pixels += (end - row + 1) * columns;
                 row = end + 1;
             }
-        }
+            piece += 1;
+        });
     }
     jobs
 }
@@ -164,7 +170,9 @@ pub(super) fn wave_length(jobs: &[Job]) -> usize {
 impl Job {
     pub(super) fn run(&self, drawn: &[Drawn], tools: &Tools<'_>) -> Vec<Fragment> {
         let mut fragments = Vec::new();
-        self.parts.iter().for_each(|part| drawn[part.drawn].fragments(part, tools, &mut fragments));
+        dispatch!(tools.level, simd => for part in &self.parts {
+            drawn[part.drawn].fragments(simd, part, tools, &mut fragments);
+        });
         fragments
     }
 }

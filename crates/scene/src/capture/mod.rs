@@ -6,13 +6,17 @@
 //! straight into a [`TraceWriter`]: memory is bounded by the scene and a few
 //! million pixels' worth of work in flight.
 
+mod batch;
 mod camera;
 mod covered;
 mod geometry;
 mod job;
+mod lanes;
 mod order;
 mod pattern;
 mod raster;
+mod samples;
+mod scan;
 mod setup;
 mod shade;
 mod splat;
@@ -20,6 +24,7 @@ mod unseen;
 
 use std::io::Write;
 
+use fearless_simd::Level;
 use rayon::prelude::*;
 
 pub use camera::{Camera, CameraChoice, CameraOptions, Chosen, Pose};
@@ -31,7 +36,8 @@ pub use unseen::Unseen;
 
 use crate::capture::geometry::{Geometry, Primitive, Triangle};
 use crate::capture::job::{Drawn, Tools, cut_into_jobs, wave_length};
-use crate::capture::setup::{STEPS, ScreenTriangle, set_up};
+use crate::capture::samples::Samples;
+use crate::capture::setup::{ScreenTriangle, set_up};
 use crate::capture::shade::Shader;
 use crate::capture::splat::Painter;
 use crate::capture::unseen::Recorded;
@@ -314,7 +320,8 @@ impl<'a> Capture<'a> {
             painter,
             placed,
             rules,
-            steps: positions.iter().map(|p| p.map(|v| i64::from(v) * STEPS / 16)).collect(),
+            level: Level::new(),
+            samples: Samples::new(positions),
             pixels: positions.iter().map(|p| p.map(|v| f64::from(v) / 16.0)).collect(),
             size: [self.options.width, self.options.height],
         }

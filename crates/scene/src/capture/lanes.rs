@@ -1,0 +1,81 @@
+//! Vectors of numbers, one for each of several fragments, with the arithmetic of shading: the
+//! same operations in the same order as [`glam`]'s, so that the last bit is the same.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x8, f64x8};
+use glam::{DVec3, Vec3};
+
+/// Fragments that are shaded at a time.
+pub(super) const LANES: usize = 8;
+/// A number of each fragment, in double and in single precision.
+pub(super) type Doubles<S> = f64x8<S>;
+pub(super) type Singles<S> = f32x8<S>;
+
+/// As `as f32` would have it.
+#[inline(always)]
+pub(super) fn narrow<S: Simd>(value: Doubles<S>) -> Singles<S> {
+    let (low, high) = value.split();
+    low.narrow(high)
+}
+
+#[inline(always)]
+fn dot<V: Copy + std::ops::Mul<Output = V> + std::ops::Add<Output = V>>(a: [V; 3], b: [V; 3]) -> V {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[inline(always)]
+pub(super) fn splat3<S: Simd>(simd: S, v: Vec3) -> [Singles<S>; 3] {
+    v.to_array().map(
+        #[inline(always)]
+        |v| Singles::splat(simd, v),
+    )
+}
+
+/// `Vec3::dot` with the same vector for all.
+#[inline(always)]
+pub(super) fn dot_with<S: Simd>(simd: S, a: [Singles<S>; 3], b: Vec3) -> Singles<S> {
+    dot(a, splat3(simd, b))
+}
+
+/// Makes `normalize_or` of a type of lanes.
+macro_rules! normalize {
+    ($name:ident, $vector:ident, $number:ident) => {
+        /// `normalize_or`: `fallback` where the reciprocal of the length is no positive number.
+        #[inline(always)]
+        pub(super) fn $name<S: Simd>(
+            simd: S,
+            v: [$vector<S>; 3],
+            fallback: [$vector<S>; 3],
+        ) -> [$vector<S>; 3] {
+            let reciprocal = $vector::splat(simd, 1.0) / dot(v, v).sqrt();
+            let good = reciprocal.simd_gt(0.0) & reciprocal.simd_lt($number::INFINITY);
+            std::array::from_fn(
+                #[inline(always)]
+                |i| good.select(v[i] * reciprocal, fallback[i]),
+            )
+        }
+    };
+}
+normalize!(normalize_doubles, Doubles, f64);
+normalize!(normalize_singles, Singles, f32);
+
+/// A point for all.
+#[inline(always)]
+pub(super) fn splat_point<S: Simd>(simd: S, v: DVec3) -> [Doubles<S>; 3] {
+    v.to_array().map(
+        #[inline(always)]
+        |v| Doubles::splat(simd, v),
+    )
+}
+
+/// `v` where it is more than `least`, else `least`: what is no number becomes `least`, too.
+#[inline(always)]
+pub(super) fn at_least<S: Simd>(simd: S, v: Singles<S>, least: f32) -> Singles<S> {
+    v.simd_gt(least).select(v, Singles::splat(simd, least))
+}
+
+/// `v` where it is less than `most`, else `most`.
+#[inline(always)]
+pub(super) fn at_most<S: Simd>(simd: S, v: Singles<S>, most: f32) -> Singles<S> {
+    v.simd_lt(most).select(v, Singles::splat(simd, most))
+}
