@@ -3,12 +3,12 @@
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
-use glam::{Vec2, Vec3, Vec4};
+use glam::{Vec2, Vec4};
 
 use crate::capture::geometry::Triangle;
 use crate::capture::lanes::{
     Doubles, LANES, Singles, at_least, at_most, dot_with, narrow, normalize_doubles,
-    normalize_singles, splat_point, splat3,
+    four, normalize_singles, splat_point, splat3, three,
 };
 use crate::capture::raster::Raster;
 use crate::capture::scan::Covered;
@@ -125,10 +125,7 @@ impl<'p> Batch<'p> {
             || material.emissive_texture.is_some();
         let weights = self.weights(simd, textured);
         let (colour, alpha, kept) = self.colours(simd, material, &weights);
-        let colour: [[f32; LANES]; 3] = colour.map(
-            #[inline(always)]
-            |c| c.into(),
-        );
+        let colour: [[f32; LANES]; 3] = [colour[0].into(), colour[1].into(), colour[2].into()];
         let alpha: [f32; LANES] = alpha.into();
         let [x, y] = self.pixels;
         let space = self.shader.space;
@@ -163,8 +160,11 @@ impl<'p> Batch<'p> {
         let from = |pixel: u16, corner: i64| {
             f64::from(pixel) * STEPS as f64 + ((STEPS / 2) - corner) as f64
         };
-        let x: [f64; LANES] = self.pixels[0].map(|x| from(x, x0));
-        let y: [f64; LANES] = self.pixels[1].map(|y| from(y, y0));
+        let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
+        for i in 0..LANES {
+            x[i] = from(self.pixels[0][i], x0);
+            y[i] = from(self.pixels[1][i], y0);
+        }
         let [per_x, per_y] = self.raster.depth_slopes;
         let (x, y) = (Doubles::from_slice(simd, &x), Doubles::from_slice(simd, &y));
         let z = x * per_x + self.raster.triangle.depth[0] + y * per_y;
@@ -176,7 +176,10 @@ impl<'p> Batch<'p> {
         let fits = if self.slopes.is_some() { fits.to_bitmask() } else { 0 };
         let [dzdx, dzdy] = self.slopes.unwrap_or_default();
         let rounded: [f64; LANES] = rounded.into();
-        let mut depths = rounded.map(|z| DepthPlane { z: Unorm32(z as u32), dzdx, dzdy });
+        let mut depths = [DepthPlane { z: Unorm32(0), dzdx, dzdy }; LANES];
+        for i in 0..LANES {
+            depths[i].z = Unorm32(rounded[i] as u32);
+        }
         let all = (1 << self.len.min(LANES)) - 1;
         if fits & all != all {
             for i in (0..self.len.min(LANES)).filter(|i| fits >> i & 1 == 0) {
@@ -192,40 +195,48 @@ impl<'p> Batch<'p> {
     #[inline(always)]
     fn weights<S: Simd>(&self, simd: S, changes: bool) -> Weights<S> {
         let t = self.raster.triangle;
-        let scaled: [Doubles<S>; 3] = std::array::from_fn(
+        let scaled = three(
             #[inline(always)]
             |i| Doubles::from_slice(simd, &self.values[i]) / (t.area as f64) * t.inverse_w[i],
         );
         let sum = scaled[0] + scaled[1] + scaled[2];
-        let values = scaled.map(
+        let values = three(
             #[inline(always)]
-            |scaled| scaled / sum,
+            |i| scaled[i] / sum,
         );
         let at = [self.of_vertex(simd, values, 0), self.of_vertex(simd, values, 1), self.of_vertex(simd, values, 2)];
         let zero = Singles::splat(simd, 0.0);
         if !changes {
             return Weights { at, changes: [[zero; 2]; 2] };
         }
-        // The quotient rule.
-        let changes = self.steps.each_ref().map(
-            #[inline(always)]
-            |(step, all)| {
-                let by: [Doubles<S>; 3] = std::array::from_fn(
-                    #[inline(always)]
-                    |i| (step[i] - values[i] * *all) / sum,
-                );
-                [narrow(self.of_vertex(simd, by, 1)), narrow(self.of_vertex(simd, by, 2))]
-            },
-        );
+        let [right, down] = &self.steps;
+        let changes = [self.change(simd, right, values, sum), self.change(simd, down, values, sum)];
         Weights { at, changes }
+    }
+
+    /// What the weights of the second and the third vertex change by over a pixel, by the
+    /// quotient rule.
+    #[inline(always)]
+    fn change<S: Simd>(
+        &self,
+        simd: S,
+        (step, all): &([f64; 3], f64),
+        values: [Doubles<S>; 3],
+        sum: Doubles<S>,
+    ) -> [Singles<S>; 2] {
+        let by = three(
+            #[inline(always)]
+            |i| (step[i] - values[i] * *all) / sum,
+        );
+        [narrow(self.of_vertex(simd, by, 1)), narrow(self.of_vertex(simd, by, 2))]
     }
 
     /// The weight of vertex `k` of the triangle, of those of the piece's corners.
     #[inline(always)]
     fn of_vertex<S: Simd>(&self, simd: S, by: [Doubles<S>; 3], k: usize) -> Doubles<S> {
         let mut sum = Doubles::splat(simd, 0.0);
-        for (by, corner) in by.into_iter().zip(&self.raster.triangle.weights) {
-            sum += by * corner[k];
+        for i in 0..3 {
+            sum += by[i] * self.raster.triangle.weights[i][k];
         }
         sum
     }
@@ -239,25 +250,26 @@ impl<'p> Batch<'p> {
         weights: &Weights<S>,
     ) -> ([Singles<S>; 3], Singles<S>, u64) {
         let [a, b, c] = &self.triangle.vertices;
-        let at = weights.at.map(
+        let at = three(
             #[inline(always)]
-            |w| narrow(w),
+            |i| narrow(weights.at[i]),
         );
         let (more, most) = (b.colour - a.colour, c.colour - a.colour);
-        let vertex: [Singles<S>; 4] = std::array::from_fn(
+        let vertex = four(
             #[inline(always)]
             |k| at[1] * more[k] + a.colour[k] + at[2] * most[k],
         );
-        let mut base: [Singles<S>; 4] = std::array::from_fn(
+        let mut base = four(
             #[inline(always)]
             |k| vertex[k] * material.base[k],
         );
         let mut detail_alpha = vertex[3];
         if let Some(texture) = material.base_texture {
             let texels = self.texels(simd, texture, at, weights);
-            for (base, texel) in base.iter_mut().zip(texels) {
-                *base *= texel;
-            }
+            base = four(
+                #[inline(always)]
+                |k| base[k] * texels[k],
+            );
             detail_alpha *= texels[3];
         }
         if let Some(texture) = material.alpha_texture {
@@ -289,9 +301,9 @@ impl<'p> Batch<'p> {
         let mut colour = [base[0], base[1], base[2]];
         if !material.unlit {
             let light = self.light(simd, weights.at, at);
-            colour = colour.map(
+            colour = three(
                 #[inline(always)]
-                |c| c * light,
+                |k| colour[k] * light,
             );
         }
         let emissive = material.emissive;
@@ -302,7 +314,7 @@ impl<'p> Batch<'p> {
             }
             None => splat3(simd, emissive),
         };
-        let colour = std::array::from_fn(
+        let colour = three(
             #[inline(always)]
             |k| at_most(simd, at_least(simd, colour[k] + glow[k], 0.0), MOST_COLOUR),
         );
@@ -320,10 +332,8 @@ impl<'p> Batch<'p> {
     ) -> [Singles<S>; 4] {
         let [a, b, c] = self.triangle.vertices.each_ref().map(|v| v.uvs[of.set]);
         let [[dx1, dx2], [dy1, dy2]] = weights.changes;
-        let lanes: [[f32; LANES]; 6] = [at[1], at[2], dx1, dx2, dy1, dy2].map(
-            #[inline(always)]
-            |w| w.into(),
-        );
+        let lanes: [[f32; LANES]; 6] =
+            [at[1].into(), at[2].into(), dx1.into(), dx2.into(), dy1.into(), dy2.into()];
         let texture = &self.shader.scene.textures[of.texture];
         let len = self.len.min(LANES);
         let mut texels = [[0.0; LANES]; 4];
@@ -343,9 +353,9 @@ impl<'p> Batch<'p> {
                 }
             },
         );
-        texels.map(
+        four(
             #[inline(always)]
-            |lanes| Singles::from_slice(simd, &lanes),
+            |k| Singles::from_slice(simd, &texels[k]),
         )
     }
 
@@ -360,14 +370,14 @@ impl<'p> Batch<'p> {
         let [a, b, c] = &self.triangle.vertices;
         let camera = self.shader.camera;
         let w = narrow_weights;
-        let normal: [Singles<S>; 3] = std::array::from_fn(
+        let normal = three(
             #[inline(always)]
             |k| w[0] * a.normal[k] + w[1] * b.normal[k] + w[2] * c.normal[k],
         );
         let towards = match camera.eye {
             None => splat3(simd, camera.back.as_vec3()),
             Some(eye) => {
-                let way: [Doubles<S>; 3] = std::array::from_fn(
+                let way = three(
                     #[inline(always)]
                     |k| {
                         let point = weights[0] * a.position[k]
@@ -376,18 +386,19 @@ impl<'p> Batch<'p> {
                         eye[k] - point
                     },
                 );
-                normalize_doubles(simd, way, splat_point(simd, camera.back)).map(
+                let way = normalize_doubles(simd, way, splat_point(simd, camera.back));
+                three(
                     #[inline(always)]
-                    |v| narrow(v),
+                    |k| narrow(way[k]),
                 )
             }
         };
         let normal = normalize_singles(simd, normal, towards);
         let facing = normal[0] * towards[0] + normal[1] * towards[1] + normal[2] * towards[2];
         let away = facing.simd_lt(0.0);
-        let normal = normal.map(
+        let normal = three(
             #[inline(always)]
-            |n| away.select(-n, n),
+            |k| away.select(-normal[k], normal[k]),
         );
         let key = at_least(simd, dot_with(simd, normal, self.shader.key), 0.0);
         let fill = at_least(simd, dot_with(simd, normal, self.shader.fill), 0.0);

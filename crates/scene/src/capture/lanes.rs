@@ -11,6 +11,19 @@ pub(super) const LANES: usize = 8;
 pub(super) type Doubles<S> = f64x8<S>;
 pub(super) type Singles<S> = f32x8<S>;
 
+/// `f` of 0, 1 and 2: what [`std::array::from_fn`] and `map` do, but without the calls that
+/// they may remain, in which vectors are passed by memory.
+#[inline(always)]
+pub(super) fn three<T>(f: impl Fn(usize) -> T) -> [T; 3] {
+    [f(0), f(1), f(2)]
+}
+
+/// `f` of 0 to 3.
+#[inline(always)]
+pub(super) fn four<T>(f: impl Fn(usize) -> T) -> [T; 4] {
+    [f(0), f(1), f(2), f(3)]
+}
+
 /// As `as f32` would have it.
 #[inline(always)]
 pub(super) fn narrow<S: Simd>(value: Doubles<S>) -> Singles<S> {
@@ -25,9 +38,9 @@ fn dot<V: Copy + std::ops::Mul<Output = V> + std::ops::Add<Output = V>>(a: [V; 3
 
 #[inline(always)]
 pub(super) fn splat3<S: Simd>(simd: S, v: Vec3) -> [Singles<S>; 3] {
-    v.to_array().map(
+    three(
         #[inline(always)]
-        |v| Singles::splat(simd, v),
+        |i| Singles::splat(simd, v[i]),
     )
 }
 
@@ -49,7 +62,7 @@ macro_rules! normalize {
         ) -> [$vector<S>; 3] {
             let reciprocal = $vector::splat(simd, 1.0) / dot(v, v).sqrt();
             let good = reciprocal.simd_gt(0.0) & reciprocal.simd_lt($number::INFINITY);
-            std::array::from_fn(
+            three(
                 #[inline(always)]
                 |i| good.select(v[i] * reciprocal, fallback[i]),
             )
@@ -62,9 +75,9 @@ normalize!(normalize_singles, Singles, f32);
 /// A point for all.
 #[inline(always)]
 pub(super) fn splat_point<S: Simd>(simd: S, v: DVec3) -> [Doubles<S>; 3] {
-    v.to_array().map(
+    three(
         #[inline(always)]
-        |v| Doubles::splat(simd, v),
+        |i| Doubles::splat(simd, v[i]),
     )
 }
 

@@ -3,6 +3,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, i32x16};
 
+use crate::capture::lanes::three;
 use crate::capture::raster::Raster;
 use crate::capture::samples::{MOST, VECTOR};
 use crate::capture::setup::STEPS;
@@ -42,10 +43,11 @@ impl<'r, 'a> Scan<'r, 'a> {
         };
         let samples = raster.samples;
         for (edge, changes) in raster.edges.iter().zip(&mut scan.changes) {
-            let [x, y] = samples.lanes.each_ref().map(|l| l[..samples.padded].chunks_exact(VECTOR));
-            for ((x, y), to) in x.zip(y).zip(changes.chunks_exact_mut(VECTOR)) {
-                let [x, y] = [x, y].map(|lanes| i32x16::from_slice(simd, lanes));
-                (x * edge.a as i32 + y * edge.b as i32).store_slice(to);
+            for i in (0..samples.padded).step_by(VECTOR) {
+                let x = i32x16::from_slice(simd, &samples.lanes[0][i..i + VECTOR]);
+                let y = i32x16::from_slice(simd, &samples.lanes[1][i..i + VECTOR]);
+                let change = x * edge.a as i32 + y * edge.b as i32;
+                change.store_slice(&mut changes[i..i + VECTOR]);
             }
         }
         scan
@@ -59,12 +61,15 @@ impl<'r, 'a> Scan<'r, 'a> {
         }
         // A sample is inside where the change is no less than what the value lacks of 0; what
         // does not fit into 32 bits is more, or less, than any change.
-        let least = values.map(|v| (-v).clamp(i32::MIN.into(), i32::MAX.into()) as i32);
+        let least = three(
+            #[inline(always)]
+            |k| (-values[k]).clamp(i32::MIN.into(), i32::MAX.into()) as i32,
+        );
         let mut mask = 0;
         for i in (0..self.raster.samples.padded).step_by(VECTOR) {
-            let [a, b, c] = [0, 1, 2].map(
+            let [a, b, c] = three(
                 #[inline(always)]
-                |k: usize| {
+                |k| {
                     i32x16::from_slice(simd, &self.changes[k][i..i + VECTOR]).simd_ge(least[k])
                 },
             );
@@ -85,13 +90,15 @@ impl<'r, 'a> Scan<'r, 'a> {
             }
         }
         let first = [span.0.saturating_mul(STEPS) + STEPS / 2, centre_y];
-        let mut values = edges.each_ref().map(|e| e.at(first));
+        let mut values = [edges[0].at(first), edges[1].at(first), edges[2].at(first)];
         for x in span.0..=span.1 {
-            let reach = |k: usize| [0, 1, 2].map(|i| values[i] + edges[i].spread[k]);
-            let [least, most] = [reach(0), reach(1)];
             // No sign is set where all are positive or 0.
-            if most[0] | most[1] | most[2] >= 0 {
-                let inside = least[0] | least[1] | least[2] >= 0;
+            let all_reach = |k: usize| {
+                let at = |i: usize| values[i] + edges[i].spread[k];
+                at(0) | at(1) | at(2) >= 0
+            };
+            if all_reach(1) {
+                let inside = all_reach(0);
                 let coverage =
                     if inside { self.raster.samples.all() } else { self.coverage(simd, values) };
                 if !coverage.is_empty() {

@@ -50,6 +50,7 @@ impl Default for Sampling {
 impl Sampling {
     /// The filter within a level, the finer of the levels that are read of 0..=`top`, and
     /// the share of the next one, where a pixel is 2^`size` texels wide.
+    #[inline(always)]
     pub(super) fn choose(&self, size: f32, top: usize) -> (Filter, usize, f32) {
         if size <= 0.0 {
             return (self.magnify, 0, 0.0);
@@ -70,6 +71,7 @@ impl Sampling {
 impl Filter {
     /// The two texels around a coordinate of a texture of `size` texels and the weight of the
     /// second.
+    #[inline(always)]
     pub(super) fn taps(self, coordinate: f32, size: u32, wrap: Wrap) -> (u32, u32, f32) {
         let period = match wrap {
             Wrap::Repeat | Wrap::Clamp => size as f32,
@@ -84,6 +86,10 @@ impl Filter {
         }
         let index = |i: f32| {
             let (i, n) = (i as i64, i64::from(size));
+            // Most are within the texture, and a division takes long.
+            if (0..n).contains(&i) {
+                return i as u32;
+            }
             let i = match wrap {
                 Wrap::Repeat => i.rem_euclid(n),
                 Wrap::Clamp => i.clamp(0, n - 1),

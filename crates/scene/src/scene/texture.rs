@@ -155,6 +155,7 @@ impl Texture {
     /// The texture's linear colour and alpha (not multiplied) at `uv`, filtered as its
     /// sampling says. `dx` and `dy` are the changes of `uv` over one pixel to the right and
     /// downwards.
+    #[inline(always)]
     pub fn sample(&self, uv: Vec2, dx: Vec2, dy: Vec2) -> Vec4 {
         let size = Vec2::new(self.width() as f32, self.height() as f32);
         // The longer of the pixel's two sides in texels: OpenGL 4.6, section 8.14.
@@ -170,6 +171,7 @@ impl Texture {
         if alpha > 0.0 { (colour.truncate() / alpha).extend(alpha) } else { Vec4::ZERO }
     }
 
+    #[inline(always)]
     fn filtered(&self, filter: Filter, level: usize, uv: Vec2) -> Vec4 {
         let (level, wrap) = (&self.levels[level], self.sampling.wrap);
         let (x0, x1, fx) = filter.taps(uv.x, level.width, wrap[0]);
@@ -184,6 +186,7 @@ impl Texture {
 }
 
 impl Level {
+    #[inline(always)]
     fn texel(&self, x: u32, y: u32) -> Vec4 {
         let [r, g, b, a] = self.texels[(y * self.width + x) as usize].map(f32::from);
         Vec4::new(r, g, b, a) / UNORM16
