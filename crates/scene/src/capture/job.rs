@@ -168,11 +168,10 @@ pub(super) fn wave_length(jobs: &[Job]) -> usize {
 }
 
 impl Job {
-    pub(super) fn run(&self, drawn: &[Drawn], tools: &Tools<'_>) -> Vec<Fragment> {
-        let mut fragments = Vec::new();
+    /// Adds what it draws to `fragments`.
+    pub(super) fn run(&self, drawn: &[Drawn], tools: &Tools<'_>, fragments: &mut Vec<Fragment>) {
         dispatch!(tools.level, simd => for part in &self.parts {
-            drawn[part.drawn].fragments(simd, part, tools, &mut fragments);
+            drawn[part.drawn].fragments(simd, part, tools, fragments);
         });
-        fragments
     }
 }

@@ -210,8 +210,8 @@ impl<'a> Capture<'a> {
         let total = geometry.len() as usize;
         let number = |i: usize| order.as_ref().map_or(i as u32, |order| order[i]);
 
-        // What the previous wave made, written while this one is drawn.
-        let mut finished: Vec<Vec<Fragment>> = Vec::new();
+        // What the previous wave made, written while this one is drawn. Both keep their memory.
+        let [mut finished, mut drawing] = [const { Vec::<Vec<Fragment>>::new() }; 2];
         for start in (0..total).step_by(CHUNK) {
             let end = (start + CHUNK).min(total);
             let drawn: Vec<Drawn> = (start..end)
@@ -223,21 +223,22 @@ impl<'a> Capture<'a> {
             while !rest.is_empty() {
                 let (wave, later) = rest.split_at(wave_length(rest));
                 rest = later;
-                let mut done = Vec::new();
+                drawing.iter_mut().for_each(Vec::clear);
+                drawing.resize_with(drawing.len().max(wave.len()), Vec::new);
                 let (written, ()) = rayon::join(
-                    || self.write_all(writer, std::mem::take(&mut finished)),
+                    || self.write_all(writer, &finished),
                     || {
                         wave.par_iter()
-                            .map(|job| job.run(&drawn, &tools))
-                            .collect_into_vec(&mut done);
+                            .zip(&mut drawing)
+                            .for_each(|(job, fragments)| job.run(&drawn, &tools, fragments));
                     },
                 );
                 written?;
-                finished = done;
+                std::mem::swap(&mut finished, &mut drawing);
             }
             progress(end as u64, total as u64);
         }
-        self.write_all(writer, finished)
+        self.write_all(writer, &finished)
     }
 
     /// The splats that are drawn, on the frame or outside of it, with their numbers.
@@ -274,9 +275,15 @@ impl<'a> Capture<'a> {
     fn write_all<W: Write>(
         &self,
         writer: &mut TraceWriter<W>,
-        fragments: Vec<Vec<Fragment>>,
+        fragments: &[Vec<Fragment>],
     ) -> Result<()> {
-        fragments.iter().flatten().try_for_each(|fragment| self.write(writer, fragment))
+        for fragments in fragments {
+            for run in fragments.chunk_by(|a, b| a.object == b.object) {
+                self.recorded.mark(run[0].object);
+            }
+            writer.push_all(fragments)?;
+        }
+        Ok(())
     }
 
     /// Writes a fragment, and notes that its object has one.

@@ -19,8 +19,10 @@ pub(crate) struct Samples {
     pub padded: usize,
     /// The least and the greatest offset along x and along y.
     pub reach: [[i64; 2]; 2],
-    /// All samples, the nearest to the centre first.
-    by_distance: Vec<u8>,
+    /// Their offsets, the nearest to the centre first.
+    by_distance: Vec<[i64; 2]>,
+    /// For each eight samples the place in `by_distance` of the nearest of those of a set.
+    nearest: Vec<[u8; 256]>,
 }
 
 impl Samples {
@@ -34,15 +36,25 @@ impl Samples {
         for (i, lanes) in lanes.iter_mut().enumerate() {
             lanes.iter_mut().zip(axis(i)).for_each(|(lane, offset)| *lane = offset as i32);
         }
-        let mut by_distance: Vec<u8> = (0..offsets.len() as u8).collect();
+        let mut order: Vec<usize> = (0..offsets.len()).collect();
         // Stable: of samples that are as near as each other the first counts.
-        by_distance.sort_by_key(|s| {
-            let [x, y] = offsets[usize::from(*s)];
+        order.sort_by_key(|s| {
+            let [x, y] = offsets[*s];
             x * x + y * y
         });
+        let by_distance = order.iter().map(|s| offsets[*s]).collect();
+        let mut nearest = vec![[u8::MAX; 256]; offsets.len().div_ceil(8)];
+        for (rank, s) in order.into_iter().enumerate() {
+            let named = |set: usize| set >> (s % 8) & 1 == 1;
+            for (set, nearest) in nearest[s / 8].iter_mut().enumerate() {
+                if named(set) {
+                    *nearest = (*nearest).min(rank as u8);
+                }
+            }
+        }
         let padded = offsets.len().next_multiple_of(VECTOR);
         let reach = [range(0), range(1)];
-        Samples { offsets, lanes, padded, reach, by_distance }
+        Samples { offsets, lanes, padded, reach, by_distance, nearest }
     }
 
     /// All of them.
@@ -53,8 +65,9 @@ impl Samples {
     /// The offset of the sample in `coverage` that is nearest to the pixel's centre.
     #[inline(always)]
     pub(super) fn nearest(&self, coverage: SampleMask) -> [i64; 2] {
-        let nearest = self.by_distance.iter().find(|s| coverage.contains(usize::from(**s)));
-        nearest.map_or([0, 0], |s| self.offsets[usize::from(*s)])
+        let eights = self.nearest.iter().zip(coverage.0.to_le_bytes());
+        let rank = eights.map(|(nearest, set)| nearest[usize::from(set)]).min();
+        rank.and_then(|rank| self.by_distance.get(usize::from(rank))).copied().unwrap_or([0, 0])
     }
 }
 
