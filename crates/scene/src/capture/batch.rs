@@ -3,7 +3,7 @@
 
 use fearless_simd::Simd;
 use fearless_simd::prelude::*;
-use glam::{Vec2, Vec4};
+use glam::Vec2;
 
 use crate::capture::geometry::Triangle;
 use crate::capture::lanes::{
@@ -31,6 +31,12 @@ pub(super) struct Batch<'p> {
     /// The depth's slopes, where they can be recorded.
     slopes: Option<[i32; 2]>,
     len: usize,
+    hits: &'p mut Hits,
+}
+
+/// What is known of fragments before they are shaded.
+#[derive(Default)]
+pub(super) struct Hits {
     pixels: [[u16; LANES]; 2],
     coverage: [SampleMask; LANES],
     /// Where to shade, from the pixel's centre.
@@ -46,12 +52,19 @@ struct Weights<S: Simd> {
     changes: [[Singles<S>; 2]; 2],
 }
 
+/// Two vectors, each by a number.
+#[inline(always)]
+fn combined<S: Simd>((x, y): (Vec2, Vec2), by: [Singles<S>; 2]) -> [Singles<S>; 2] {
+    [by[0] * x.x + by[1] * y.x, by[0] * x.y + by[1] * y.y]
+}
+
 impl<'p> Batch<'p> {
     #[inline(always)]
     pub(super) fn new(
         raster: &'p Raster<'p>,
         triangle: &'p Triangle,
         shader: &'p Shader<'p>,
+        hits: &'p mut Hits,
     ) -> Self {
         let t = raster.triangle;
         let step = STEPS as f64 / t.area as f64;
@@ -67,10 +80,7 @@ impl<'p> Batch<'p> {
             steps: [scaled(|e| e[0] as f64), scaled(|e| e[1] as f64)],
             slopes: raster.recorded_slopes(),
             len: 0,
-            pixels: [[0; LANES]; 2],
-            coverage: [SampleMask::NONE; LANES],
-            aside: [[0; 2]; LANES],
-            values: [[0.0; LANES]; 3],
+            hits,
         }
     }
 
@@ -89,12 +99,12 @@ impl<'p> Batch<'p> {
         let i = self.len % LANES;
         for (k, edge) in self.raster.edges.iter().enumerate() {
             let there = values[k] + edge.lowered + edge.a * aside[0] + edge.b * aside[1];
-            self.values[k][i] = there as f64;
+            self.hits.values[k][i] = there as f64;
         }
-        self.pixels[0][i] = x as u16;
-        self.pixels[1][i] = y as u16;
-        self.coverage[i] = coverage;
-        self.aside[i] = aside;
+        self.hits.pixels[0][i] = x as u16;
+        self.hits.pixels[1][i] = y as u16;
+        self.hits.coverage[i] = coverage;
+        self.hits.aside[i] = aside;
         self.len += 1;
         if self.len == LANES {
             self.finish(simd, fragments);
@@ -127,7 +137,7 @@ impl<'p> Batch<'p> {
         let (colour, alpha, kept) = self.colours(simd, material, &weights);
         let colour: [[f32; LANES]; 3] = [colour[0].into(), colour[1].into(), colour[2].into()];
         let alpha: [f32; LANES] = alpha.into();
-        let [x, y] = self.pixels;
+        let [x, y] = self.hits.pixels;
         let space = self.shader.space;
         let of = Fragment {
             primitive: self.triangle.primitive,
@@ -144,7 +154,7 @@ impl<'p> Batch<'p> {
             fragments.push(Fragment {
                 x: x[i],
                 y: y[i],
-                coverage: self.coverage[i],
+                coverage: self.hits.coverage[i],
                 depth: depths[i],
                 colour,
                 alpha: alpha[i],
@@ -162,8 +172,8 @@ impl<'p> Batch<'p> {
         };
         let (mut x, mut y) = ([0.0; LANES], [0.0; LANES]);
         for i in 0..LANES {
-            x[i] = from(self.pixels[0][i], x0);
-            y[i] = from(self.pixels[1][i], y0);
+            x[i] = from(self.hits.pixels[0][i], x0);
+            y[i] = from(self.hits.pixels[1][i], y0);
         }
         let [per_x, per_y] = self.raster.depth_slopes;
         let (x, y) = (Doubles::from_slice(simd, &x), Doubles::from_slice(simd, &y));
@@ -183,8 +193,8 @@ impl<'p> Batch<'p> {
         let all = (1 << self.len.min(LANES)) - 1;
         if fits & all != all {
             for i in (0..self.len.min(LANES)).filter(|i| fits >> i & 1 == 0) {
-                let centre = [0, 1].map(|k| i64::from(self.pixels[k][i]) * STEPS + STEPS / 2);
-                let [x, y] = self.aside[i];
+                let centre = [0, 1].map(|k| i64::from(self.hits.pixels[k][i]) * STEPS + STEPS / 2);
+                let [x, y] = self.hits.aside[i];
                 depths[i] = self.raster.depth_plane(centre, [centre[0] + x, centre[1] + y]);
             }
         }
@@ -197,7 +207,7 @@ impl<'p> Batch<'p> {
         let t = self.raster.triangle;
         let scaled = three(
             #[inline(always)]
-            |i| Doubles::from_slice(simd, &self.values[i]) / (t.area as f64) * t.inverse_w[i],
+            |i| Doubles::from_slice(simd, &self.hits.values[i]) / (t.area as f64) * t.inverse_w[i],
         );
         let sum = scaled[0] + scaled[1] + scaled[2];
         let values = three(
@@ -331,24 +341,27 @@ impl<'p> Batch<'p> {
         weights: &Weights<S>,
     ) -> [Singles<S>; 4] {
         let [a, b, c] = self.triangle.vertices.each_ref().map(|v| v.uvs[of.set]);
-        let [[dx1, dx2], [dy1, dy2]] = weights.changes;
-        let lanes: [[f32; LANES]; 6] =
-            [at[1].into(), at[2].into(), dx1.into(), dx2.into(), dy1.into(), dy2.into()];
+        // From weights to the mesh's coordinates, and from those to the texture's.
+        let mesh = (b - a, c - a);
+        let turn = (of.transform.matrix2.x_axis, of.transform.matrix2.y_axis);
+        let [u, v] = combined(mesh, [at[1], at[2]]);
+        let [u, v] = combined(turn, [u + a.x, v + a.y]);
+        let moved = of.transform.translation;
+        let uv = [(u + moved.x).into(), (v + moved.y).into()];
+        let [dx, dy] = weights.changes;
+        let ([ux, vx], [uy, vy]) =
+            (combined(turn, combined(mesh, dx)), combined(turn, combined(mesh, dy)));
+        let (dx, dy) = ([ux.into(), vx.into()], [uy.into(), vy.into()]);
         let texture = &self.shader.scene.textures[of.texture];
-        let len = self.len.min(LANES);
+        let len = self.len;
         let mut texels = [[0.0; LANES]; 4];
         simd.vectorize(
             #[inline(always)]
             || {
-                for i in 0..len {
-                    let w = lanes.each_ref().map(|lane| lane[i]);
-                    let turned = |w: [f32; 2]| (b - a) * w[0] + (c - a) * w[1];
-                    let turn = |v: Vec2| of.transform.matrix2 * v;
-                    let at = of.transform.transform_point2(a + turned([w[0], w[1]]));
-                    let (dx, dy) = (turn(turned([w[2], w[3]])), turn(turned([w[4], w[5]])));
-                    let texel: Vec4 = texture.sample(at, dx, dy);
-                    for (k, value) in texel.to_array().into_iter().enumerate() {
-                        texels[k][i] = value;
+                let found = texture.sample_each(&uv, &dx, &dy, len);
+                for (i, texel) in found.iter().enumerate() {
+                    for k in 0..4 {
+                        texels[k][i] = texel[k];
                     }
                 }
             },

@@ -6,7 +6,7 @@ use crate::capture::geometry::{Geometry, Primitive, Triangle};
 use crate::capture::raster::{Raster, Weights};
 use crate::capture::samples::Samples;
 use crate::capture::setup::STEPS;
-use crate::capture::setup::ScreenTriangle;
+use crate::capture::setup::Pieces;
 use crate::capture::shade::Shader;
 use crate::capture::{Capture, order};
 use screendoor_trace::error::{Error, Result};
@@ -25,7 +25,7 @@ pub struct SetUp<'a> {
     drawing: &'a Drawing<'a>,
     triangle: Triangle,
     /// What clipping left of it.
-    pieces: Vec<ScreenTriangle>,
+    pieces: Pieces,
     samples: Samples,
 }
 

@@ -2,20 +2,22 @@
 
 use fearless_simd::{Level, Simd, dispatch};
 
-use crate::capture::batch::Batch;
+use crate::capture::batch::{Batch, Hits};
 use crate::capture::geometry::{Splat, Triangle};
 use crate::capture::raster::{Bounds, Raster};
-use crate::capture::samples::Samples;
-use crate::capture::scan::Scan;
-use crate::capture::setup::ScreenTriangle;
+use crate::capture::samples::{MOST, Samples};
+use crate::capture::scan::{Changes, Scan};
+use crate::capture::setup::{Pieces, ScreenTriangle};
 use crate::capture::shade::Shader;
 use crate::capture::splat::{Nothing, OnFrame, Painter, Placed, SplatRules};
 use screendoor_trace::trace::Fragment;
 
 /// Pixels of bounding boxes that one job rasterises.
 const JOB_PIXELS: i64 = 1 << 13;
-/// Pixels of bounding boxes that are in flight at a time.
-const WAVE_PIXELS: i64 = 1 << 19;
+/// What setting a triangle up costs, in pixels.
+const SET_UP: i64 = 8;
+/// Jobs that are in flight at a time, for each thread.
+const WAVE: usize = 4;
 
 /// What a capture draws with.
 pub(super) struct Tools<'a> {
@@ -48,13 +50,19 @@ pub(super) enum Drawn {
     Triangle {
         triangle: Triangle,
         /// What clipping left of it.
-        pieces: Vec<ScreenTriangle>,
+        pieces: Pieces,
     },
     Splat {
         on_frame: std::result::Result<OnFrame, Nothing>,
         object: u32,
         primitive: u32,
     },
+}
+
+/// What a job works in, made once for all of its triangles.
+struct Room {
+    changes: Changes,
+    hits: Hits,
 }
 
 /// The rows that something may touch, empty where they cross, and the pixels of each.
@@ -85,13 +93,14 @@ impl Drawn {
         simd: S,
         part: &Part,
         tools: &Tools<'_>,
+        room: &mut Room,
         fragments: &mut Vec<Fragment>,
     ) {
         match self {
             Drawn::Triangle { triangle, pieces } => {
-                let raster = tools.raster(&pieces[part.piece]);
-                let scan = Scan::new(simd, &raster);
-                let mut batch = Batch::new(&raster, triangle, &tools.shader);
+                let raster = tools.raster(pieces.get(part.piece));
+                let scan = Scan::new(simd, &raster, &mut room.changes);
+                let mut batch = Batch::new(&raster, triangle, &tools.shader, &mut room.hits);
                 for y in part.rows.0..=part.rows.1 {
                     scan.row(
                         simd,
@@ -107,8 +116,7 @@ impl Drawn {
                 let (object, primitive) = (*object, *primitive);
                 let of = Fragment { object, primitive, ..Fragment::default() };
                 for y in part.rows.0..=part.rows.1 {
-                    let push = |fragment| fragments.push(fragment);
-                    splat.row(y, tools.rules, &tools.pixels, of, push);
+                    splat.row(y, tools.rules, &tools.pixels, of, fragments);
                 }
             }
         }
@@ -148,7 +156,7 @@ pub(super) fn cut_into_jobs(drawn: &[Drawn], tools: &Tools<'_>) -> Vec<Job> {
                 let room = ((JOB_PIXELS - job.pixels) / columns).max(1);
                 let end = (row + room - 1).min(last);
                 job.parts.push(Part { drawn: i, piece, rows: (row, end) });
-                job.pixels += (end - row + 1) * columns;
+                job.pixels += (end - row + 1) * columns + SET_UP;
                 row = end + 1;
             }
             piece += 1;
@@ -157,21 +165,18 @@ pub(super) fn cut_into_jobs(drawn: &[Drawn], tools: &Tools<'_>) -> Vec<Job> {
     jobs
 }
 
-/// How many of `jobs` make up a wave.
+/// How many of `jobs` make up a wave: enough that no thread waits, and few enough that what they
+/// make is still in the caches when it is written.
 pub(super) fn wave_length(jobs: &[Job]) -> usize {
-    let mut pixels = 0;
-    let full = jobs.iter().position(|job| {
-        pixels += job.pixels;
-        pixels >= WAVE_PIXELS
-    });
-    full.map_or(jobs.len(), |last| last + 1)
+    jobs.len().min(WAVE * rayon::current_num_threads())
 }
 
 impl Job {
     /// Adds what it draws to `fragments`.
     pub(super) fn run(&self, drawn: &[Drawn], tools: &Tools<'_>, fragments: &mut Vec<Fragment>) {
+        let mut room = Room { changes: [[0; MOST]; 3], hits: Hits::default() };
         dispatch!(tools.level, simd => for part in &self.parts {
-            drawn[part.drawn].fragments(simd, part, tools, fragments);
+            drawn[part.drawn].fragments(simd, part, tools, &mut room, fragments);
         });
     }
 }

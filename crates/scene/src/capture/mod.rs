@@ -37,7 +37,7 @@ pub use unseen::Unseen;
 use crate::capture::geometry::{Geometry, Primitive, Triangle};
 use crate::capture::job::{Drawn, Tools, cut_into_jobs, wave_length};
 use crate::capture::samples::Samples;
-use crate::capture::setup::{ScreenTriangle, set_up};
+use crate::capture::setup::{Pieces, set_up};
 use crate::capture::shade::Shader;
 use crate::capture::splat::Painter;
 use crate::capture::unseen::Recorded;
@@ -136,8 +136,8 @@ pub struct Capture<'a> {
     recorded: Recorded,
 }
 
-/// Triangles and splats set up at a time.
-const CHUNK: usize = 1 << 14;
+/// Triangles and splats set up at a time, for each thread: as many as its cache holds.
+const CHUNK: usize = 1 << 11;
 impl<'a> Capture<'a> {
     /// Places the camera and makes the trace's header.
     ///
@@ -212,8 +212,9 @@ impl<'a> Capture<'a> {
 
         // What the previous wave made, written while this one is drawn. Both keep their memory.
         let [mut finished, mut drawing] = [const { Vec::<Vec<Fragment>>::new() }; 2];
-        for start in (0..total).step_by(CHUNK) {
-            let end = (start + CHUNK).min(total);
+        let chunk = CHUNK * rayon::current_num_threads();
+        for start in (0..total).step_by(chunk) {
+            let end = (start + chunk).min(total);
             let drawn: Vec<Drawn> = (start..end)
                 .into_par_iter()
                 .map(|i| self.prepare(geometry.primitive(number(i)), &tools))
@@ -293,8 +294,8 @@ impl<'a> Capture<'a> {
     }
 
     /// What clipping leaves of a triangle.
-    fn set_up(&self, triangle: &Triangle, shader: &Shader<'_>) -> Vec<ScreenTriangle> {
-        let mut pieces = Vec::new();
+    fn set_up(&self, triangle: &Triangle, shader: &Shader<'_>) -> Pieces {
+        let mut pieces = Pieces::default();
         set_up(triangle, &self.camera, self.keeps_back(triangle, shader), &mut pieces);
         pieces
     }

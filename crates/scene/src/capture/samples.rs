@@ -43,15 +43,18 @@ impl Samples {
             x * x + y * y
         });
         let by_distance = order.iter().map(|s| offsets[*s]).collect();
-        let mut nearest = vec![[u8::MAX; 256]; offsets.len().div_ceil(8)];
-        for (rank, s) in order.into_iter().enumerate() {
-            let named = |set: usize| set >> (s % 8) & 1 == 1;
-            for (set, nearest) in nearest[s / 8].iter_mut().enumerate() {
-                if named(set) {
-                    *nearest = (*nearest).min(rank as u8);
-                }
+        let mut ranks = [u8::MAX; MOST];
+        order.iter().enumerate().for_each(|(rank, s)| ranks[*s] = rank as u8);
+        // A set is its first sample and a smaller set.
+        let table = |ranks: &[u8]| {
+            let mut nearest = [u8::MAX; 256];
+            for set in 1..256_usize {
+                let first = ranks[set.trailing_zeros() as usize];
+                nearest[set] = first.min(nearest[set & (set - 1)]);
             }
-        }
+            nearest
+        };
+        let nearest = ranks.chunks(8).take(offsets.len().div_ceil(8)).map(table).collect();
         let padded = offsets.len().next_multiple_of(VECTOR);
         let reach = [range(0), range(1)];
         Samples { offsets, lanes, padded, reach, by_distance, nearest }

@@ -25,24 +25,22 @@ pub(super) struct Covered {
     pub values: [i64; 3],
 }
 
+/// What a triangle's edges change by from a pixel's centre to each sample.
+pub(super) type Changes = [[i32; MOST]; 3];
+
 /// A triangle with what its edges change by from a pixel's centre to each sample.
 pub(super) struct Scan<'r, 'a> {
     raster: &'r Raster<'a>,
-    changes: [[i32; MOST]; 3],
+    changes: &'r Changes,
     /// Whether the changes fit into 32 bits; where they do not, coverage is found one sample at a time.
     fits: bool,
 }
 
 impl<'r, 'a> Scan<'r, 'a> {
     #[inline(always)]
-    pub(super) fn new<S: Simd>(simd: S, raster: &'r Raster<'a>) -> Self {
-        let mut scan = Scan {
-            raster,
-            changes: [[0; MOST]; 3],
-            fits: raster.edges.iter().all(|e| e.a.abs() + e.b.abs() < LONGEST),
-        };
+    pub(super) fn new<S: Simd>(simd: S, raster: &'r Raster<'a>, room: &'r mut Changes) -> Self {
         let samples = raster.samples;
-        for (edge, changes) in raster.edges.iter().zip(&mut scan.changes) {
+        for (edge, changes) in raster.edges.iter().zip(&mut *room) {
             for i in (0..samples.padded).step_by(VECTOR) {
                 let x = i32x16::from_slice(simd, &samples.lanes[0][i..i + VECTOR]);
                 let y = i32x16::from_slice(simd, &samples.lanes[1][i..i + VECTOR]);
@@ -50,7 +48,8 @@ impl<'r, 'a> Scan<'r, 'a> {
                 change.store_slice(&mut changes[i..i + VECTOR]);
             }
         }
-        scan
+        let fits = raster.edges.iter().all(|e| e.a.abs() + e.b.abs() < LONGEST);
+        Scan { raster, changes: room, fits }
     }
 
     /// The samples of a pixel for whose centre the edges have these values.

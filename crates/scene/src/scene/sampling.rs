@@ -68,6 +68,88 @@ impl Sampling {
     }
 }
 
+/// The two texels around each of several coordinates, the weights of the second ones, and
+/// whether they are what [`Filter::taps`] says: not where a coordinate is beyond all reason.
+pub(super) struct Taps<const N: usize> {
+    pub low: [u32; N],
+    pub high: [u32; N],
+    pub weight: [f32; N],
+    pub good: bool,
+}
+
+impl<const N: usize> Taps<N> {
+    /// By the linear filter, of textures of `sizes` texels.
+    #[inline(always)]
+    pub(super) fn linear(coordinates: &[f32; N], sizes: &[u32; N], wrap: Wrap) -> Self {
+        match wrap {
+            Wrap::Repeat => Self::with(
+                coordinates,
+                sizes,
+                1,
+                false,
+                #[inline(always)]
+                |i, n| {
+                    let i = if i < 0 { i + n } else { i };
+                    if i >= n { i - n } else { i }
+                },
+            ),
+            Wrap::Clamp => Self::with(
+                coordinates,
+                sizes,
+                1,
+                true,
+                #[inline(always)]
+                |i, n| i.max(0).min(n - 1),
+            ),
+            Wrap::Mirror => Self::with(
+                coordinates,
+                sizes,
+                2,
+                false,
+                #[inline(always)]
+                |i, n| {
+                    let i = if i < 0 { i + 2 * n } else { i };
+                    let i = if i >= 2 * n { i - 2 * n } else { i };
+                    if i < n { i } else { 2 * n - 1 - i }
+                },
+            ),
+        }
+    }
+
+    /// The same with a period of `periods` sizes, of which `place` finds a texel at most a
+    /// period beside the first.
+    #[inline(always)]
+    fn with(
+        coordinates: &[f32; N],
+        sizes: &[u32; N],
+        periods: u32,
+        clamped: bool,
+        place: impl Fn(i32, i32) -> i32,
+    ) -> Self {
+        let mut taps = Taps { low: [0; N], high: [0; N], weight: [0.0; N], good: true };
+        for i in 0..N {
+            let (n, size) = (sizes[i] as i32, sizes[i] as f32);
+            let period = periods as f32 * size;
+            let at = coordinates[i] * size;
+            let at = match clamped {
+                true if at < 0.0 => 0.0,
+                true if at > period => period,
+                true => at,
+                false => at - period * (at / period).floor(),
+            } - 0.5;
+            let low = at.floor();
+            // What is no number is not good either.
+            taps.good &= low >= -1.0 && low < period;
+            taps.weight[i] = at - low;
+            // Between -1 and a period, which 16 bits hold, or not good.
+            let first = low as i32;
+            taps.low[i] = place(first, n) as u32;
+            taps.high[i] = place(first + 1, n) as u32;
+        }
+        taps
+    }
+}
+
 impl Filter {
     /// The two texels around a coordinate of a texture of `size` texels and the weight of the
     /// second.

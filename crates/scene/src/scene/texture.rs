@@ -5,9 +5,10 @@ use std::path::Path;
 use glam::{Vec2, Vec4};
 use image::DynamicImage;
 
+use crate::elementary;
 use crate::scene::file;
 use crate::scene::image_file::{self, MAX_SIDE};
-use crate::scene::sampling::{Filter, Sampling, Wrap};
+use crate::scene::sampling::{Filter, Sampling, Taps, Wrap};
 use screendoor_trace::error::Result;
 use screendoor_trace::picture::{Rgba, srgb};
 
@@ -167,8 +168,106 @@ impl Texture {
         if blend > 0.0 && fine < top {
             colour = colour.lerp(self.filtered(filter, fine + 1, uv), blend);
         }
-        let alpha = colour.w;
-        if alpha > 0.0 { (colour.truncate() / alpha).extend(alpha) } else { Vec4::ZERO }
+        divided(colour)
+    }
+
+    /// [`Texture::sample`] for the first `count` of several places at once.
+    #[inline(always)]
+    pub(crate) fn sample_each<const N: usize>(
+        &self,
+        uv: &[[f32; N]; 2],
+        dx: &[[f32; N]; 2],
+        dy: &[[f32; N]; 2],
+        count: usize,
+    ) -> [Vec4; N] {
+        let count = count.min(N);
+        let linear = [self.sampling.magnify, self.sampling.minify] == [Filter::Linear; 2];
+        let many = if linear { self.filtered_each(uv, dx, dy, count) } else { None };
+        many.unwrap_or_else(|| {
+            let mut colours = [Vec4::ZERO; N];
+            for (i, colour) in colours[..count].iter_mut().enumerate() {
+                let at = |v: &[[f32; N]; 2]| Vec2::new(v[0][i], v[1][i]);
+                *colour = self.sample(at(uv), at(dx), at(dy));
+            }
+            colours
+        })
+    }
+
+    /// The same where filters are linear; `None` where a number is beyond all reason.
+    #[inline(always)]
+    fn filtered_each<const N: usize>(
+        &self,
+        uv: &[[f32; N]; 2],
+        dx: &[[f32; N]; 2],
+        dy: &[[f32; N]; 2],
+        count: usize,
+    ) -> Option<[Vec4; N]> {
+        let (width, height) = (self.width() as f32, self.height() as f32);
+        let square = |x: f32, y: f32| {
+            let (x, y) = (x * width, y * height);
+            x * x + y * y
+        };
+        let mut sizes = [0.0; N];
+        let mut finite = true;
+        for i in 0..N {
+            let footprint = square(dx[0][i], dx[1][i]).max(square(dy[0][i], dy[1][i]));
+            finite &= i >= count || footprint < f32::INFINITY;
+            let texels = 0.5 * elementary::log2(footprint);
+            sizes[i] = if footprint > 1.0 { texels } else { 0.0 };
+        }
+        if !finite {
+            return None;
+        }
+        let top = self.levels.len() - 1;
+        // The finer level of each place and the share of the next.
+        let (mut fine, mut blends) = ([0; N], [0.0; N]);
+        for i in 0..count {
+            (_, fine[i], blends[i]) = self.sampling.choose(sizes[i], top);
+        }
+        let mut colours = self.level_each(uv, &fine, count)?;
+        let both = |i: usize| blends[i] > 0.0 && fine[i] < top;
+        if (0..count).any(both) {
+            let coarse = fine.map(|level| (level + 1).min(top));
+            let others = self.level_each(uv, &coarse, count)?;
+            for i in (0..count).filter(|i| both(*i)) {
+                colours[i] = colours[i].lerp(others[i], blends[i]);
+            }
+        }
+        for colour in &mut colours[..count] {
+            *colour = divided(*colour);
+        }
+        Some(colours)
+    }
+
+    /// [`Texture::filtered`], linear, of a level for each place.
+    #[inline(always)]
+    fn level_each<const N: usize>(
+        &self,
+        uv: &[[f32; N]; 2],
+        levels: &[usize; N],
+        count: usize,
+    ) -> Option<[Vec4; N]> {
+        let mut sizes = [[1; N]; 2];
+        let mut coordinates = [[0.5; N]; 2];
+        for i in 0..count {
+            let level = &self.levels[levels[i]];
+            (sizes[0][i], sizes[1][i]) = (level.width, level.height);
+            (coordinates[0][i], coordinates[1][i]) = (uv[0][i], uv[1][i]);
+        }
+        let x = Taps::linear(&coordinates[0], &sizes[0], self.sampling.wrap[0]);
+        let y = Taps::linear(&coordinates[1], &sizes[1], self.sampling.wrap[1]);
+        if !(x.good && y.good) {
+            return None;
+        }
+        let mut colours = [Vec4::ZERO; N];
+        for i in 0..count {
+            let level = &self.levels[levels[i]];
+            let row = |y: u32| {
+                level.texel(x.low[i], y).lerp(level.texel(x.high[i], y), x.weight[i])
+            };
+            colours[i] = row(y.low[i]).lerp(row(y.high[i]), y.weight[i]);
+        }
+        Some(colours)
     }
 
     #[inline(always)]
@@ -183,6 +282,13 @@ impl Texture {
         let bottom = level.texel(x0, y1).lerp(level.texel(x1, y1), fx);
         top.lerp(bottom, fy)
     }
+}
+
+/// A colour that was multiplied by its alpha, not multiplied.
+#[inline(always)]
+fn divided(colour: Vec4) -> Vec4 {
+    let alpha = colour.w;
+    if alpha > 0.0 { (colour.truncate() / alpha).extend(alpha) } else { Vec4::ZERO }
 }
 
 impl Level {

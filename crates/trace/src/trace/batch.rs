@@ -168,6 +168,14 @@ macro_rules! batches {
                 keeps
             }
 
+            /// Builds in the memory of a batch that was taken, where nobody else has it.
+            pub(super) fn reuse(&mut self, batch: Batch) {
+                $(Cells::reuse(batch.$name, &mut self.$name);)*
+                $(if let (Some(column), Some(growing)) = (batch.$oname, &mut self.$oname) {
+                    Cells::reuse(column, growing);
+                })*
+            }
+
             /// The fragments so far as a batch; the builder is empty after.
             pub(super) fn take(&mut self) -> Batch {
                 Batch {

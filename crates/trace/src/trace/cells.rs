@@ -53,6 +53,8 @@ pub trait Cells: Sized {
     fn extend(growing: &mut Self::Growing, values: impl Iterator<Item = Self::Value>);
     /// The values so far; the growing column is empty after.
     fn take(growing: &mut Self::Growing) -> Self;
+    /// Gives the memory of a column that was taken back, where nobody else has it.
+    fn reuse(self, growing: &mut Self::Growing);
     /// Copies rows to a block, masks as far as they lie within `mask`.
     fn copy(&self, from: Stretches<'_>, to: &mut Values<Self::Value>, mask: SampleMask);
 }
@@ -135,11 +137,17 @@ impl<T: Native> Cells for Column<T> {
     fn take(growing: &mut Growing<T>) -> Self {
         match growing.constant {
             Some(v) => Column::Constant(v),
-            None => {
-                let capacity = growing.values.capacity();
-                let full = std::mem::replace(&mut growing.values, Vec::with_capacity(capacity));
-                Column::Values(full.into())
-            }
+            None => Column::Values(std::mem::take(&mut growing.values).into()),
+        }
+    }
+
+    fn reuse(self, growing: &mut Growing<T>) {
+        if let Column::Values(values) = self
+            && let Ok(mut values) = values.into_inner().into_vec::<T>()
+            && growing.values.is_empty()
+        {
+            values.clear();
+            growing.values = values;
         }
     }
 
@@ -361,6 +369,16 @@ macro_rules! either {
                 match growing {
                     $($growing::$variant(column) => $name::$variant(Column::take(column)),)+
                     $growing::$last(column) => $name::$last(Column::take(column)),
+                }
+            }
+
+            fn reuse(self, growing: &mut $growing) {
+                match (self, growing) {
+                    $(($name::$variant(column), $growing::$variant(growing)) => {
+                        column.reuse(growing);
+                    })+
+                    ($name::$last(column), $growing::$last(growing)) => column.reuse(growing),
+                    _ => {}
                 }
             }
 

@@ -195,8 +195,10 @@ impl<W: Write> TraceWriter<W> {
         }
         let record_batch = batch.to_record_batch(&self.schema);
         self.file.write(&record_batch).map_err(|e| arrow_error(&self.place, e))?;
+        drop(record_batch);
         self.file.get_mut().end_block(batch.len() as u64);
         self.rows += batch.len() as u64;
+        self.builder.reuse(batch);
         Ok(())
     }
 
