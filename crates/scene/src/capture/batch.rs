@@ -95,7 +95,10 @@ impl<'p> Batch<'p> {
     ) {
         let Covered { x, coverage, values } = covered;
         let holds_centre = values[0] | values[1] | values[2] >= 0;
-        let aside = if holds_centre { [0, 0] } else { self.raster.samples.nearest(coverage) };
+        let aside = match holds_centre {
+            true => [0, 0],
+            false => self.raster.samples.nearest_in(simd, coverage),
+        };
         let i = self.len % LANES;
         for (k, edge) in self.raster.edges.iter().enumerate() {
             let there = values[k] + edge.lowered + edge.a * aside[0] + edge.b * aside[1];

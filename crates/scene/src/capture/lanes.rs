@@ -50,6 +50,20 @@ pub(super) fn dot_with<S: Simd>(simd: S, a: [Singles<S>; 3], b: Vec3) -> Singles
     dot(a, splat3(simd, b))
 }
 
+/// All levels of instructions that this machine has.
+#[cfg(test)]
+pub(super) fn levels() -> Vec<fearless_simd::Level> {
+    use fearless_simd::Level;
+    let here = Level::new();
+    let mut levels = vec![Level::baseline(), Level::fallback(), here];
+    #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+    {
+        levels.extend(here.as_sse4_2().map(Level::Sse4_2));
+        levels.extend(here.as_avx2().map(Level::Avx2));
+    }
+    levels
+}
+
 /// Makes `normalize_or` of a type of lanes.
 macro_rules! normalize {
     ($name:ident, $vector:ident, $number:ident) => {

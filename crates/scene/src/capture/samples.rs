@@ -1,5 +1,8 @@
 //! A pixel's samples, as the rasteriser needs them.
 
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, i32x16, mask32x16};
+
 use crate::capture::setup::STEPS;
 use screendoor_trace::trace::{MAX_SAMPLES, SampleMask};
 
@@ -21,8 +24,8 @@ pub(crate) struct Samples {
     pub reach: [[i64; 2]; 2],
     /// Their offsets, the nearest to the centre first.
     by_distance: Vec<[i64; 2]>,
-    /// For each eight samples the place in `by_distance` of the nearest of those of a set.
-    nearest: Vec<[u8; 256]>,
+    /// Each sample's place there, padded to whole vectors.
+    ranks: [i32; MOST],
 }
 
 impl Samples {
@@ -43,21 +46,11 @@ impl Samples {
             x * x + y * y
         });
         let by_distance = order.iter().map(|s| offsets[*s]).collect();
-        let mut ranks = [u8::MAX; MOST];
-        order.iter().enumerate().for_each(|(rank, s)| ranks[*s] = rank as u8);
-        // A set is its first sample and a smaller set.
-        let table = |ranks: &[u8]| {
-            let mut nearest = [u8::MAX; 256];
-            for set in 1..256_usize {
-                let first = ranks[set.trailing_zeros() as usize];
-                nearest[set] = first.min(nearest[set & (set - 1)]);
-            }
-            nearest
-        };
-        let nearest = ranks.chunks(8).take(offsets.len().div_ceil(8)).map(table).collect();
+        let mut ranks = [i32::MAX; MOST];
+        order.iter().enumerate().for_each(|(rank, s)| ranks[*s] = rank as i32);
         let padded = offsets.len().next_multiple_of(VECTOR);
         let reach = [range(0), range(1)];
-        Samples { offsets, lanes, padded, reach, by_distance, nearest }
+        Samples { offsets, lanes, padded, reach, by_distance, ranks }
     }
 
     /// All of them.
@@ -66,18 +59,35 @@ impl Samples {
     }
 
     /// The offset of the sample in `coverage` that is nearest to the pixel's centre.
-    #[inline(always)]
     pub(super) fn nearest(&self, coverage: SampleMask) -> [i64; 2] {
-        let eights = self.nearest.iter().zip(coverage.0.to_le_bytes());
-        let rank = eights.map(|(nearest, set)| nearest[usize::from(set)]).min();
-        rank.and_then(|rank| self.by_distance.get(usize::from(rank))).copied().unwrap_or([0, 0])
+        self.of_rank(coverage.iter().map(|s| self.ranks[s]).min().unwrap_or(i32::MAX))
+    }
+
+    /// The same in vectors.
+    #[inline(always)]
+    pub(super) fn nearest_in<S: Simd>(&self, simd: S, coverage: SampleMask) -> [i64; 2] {
+        let none = i32x16::splat(simd, i32::MAX);
+        let mut least = none;
+        for i in (0..self.padded).step_by(VECTOR) {
+            let covered = mask32x16::from_bitmask(simd, coverage.0 >> i);
+            let ranks = i32x16::from_slice(simd, &self.ranks[i..i + VECTOR]);
+            least = least.min(covered.select(ranks, none));
+        }
+        self.of_rank(least.reduce_min())
+    }
+
+    #[inline(always)]
+    fn of_rank(&self, rank: i32) -> [i64; 2] {
+        self.by_distance.get(rank as usize).copied().unwrap_or([0, 0])
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::capture::lanes::levels;
     use crate::capture::pattern::{PatternKind, pattern};
+    use fearless_simd::dispatch;
 
     #[test]
     fn the_nearest_of_some_samples_is_found() {
@@ -92,6 +102,10 @@ mod tests {
                 let offsets = coverage.iter().map(|s| samples.offsets[s]);
                 let wanted = offsets.min_by_key(|o| square(*o)).unwrap_or([0, 0]);
                 assert_eq!(samples.nearest(coverage), wanted);
+                for level in levels() {
+                    let found = dispatch!(level, simd => samples.nearest_in(simd, coverage));
+                    assert_eq!(found, wanted, "{level:?}");
+                }
             }
         }
     }

@@ -188,11 +188,12 @@ impl<W: Write> TraceWriter<W> {
     fn flush_batch(&mut self) -> Result<()> {
         let batch = self.builder.take();
         batch.check(&self.header, &format!("{}, after row {}", self.place, self.rows))?;
-        for (id, stored) in batch.buffers() {
-            if let Some((value_type, bytes)) = stored {
-                self.content.update(id, &bytes.as_slice()[..batch.len() * value_type.bytes()]);
-            }
-        }
+        let buffers = batch.buffers();
+        let stored = buffers.iter().filter_map(|(id, stored)| {
+            let (value_type, bytes) = stored.as_ref()?;
+            Some((*id, &bytes.as_slice()[..batch.len() * value_type.bytes()]))
+        });
+        self.content.update_all(&stored.collect::<Vec<_>>());
         let record_batch = batch.to_record_batch(&self.schema);
         self.file.write(&record_batch).map_err(|e| arrow_error(&self.place, e))?;
         drop(record_batch);
