@@ -15,7 +15,8 @@ fn main() {
         let (name, rules) = spec.split_once('@').unwrap_or((spec, "inria"));
         let scene = screendoor_scene::scene::load(name).unwrap();
         for &samples in &samples {
-            let mut options = CaptureOptions { width: size, height: size, samples, ..Default::default() };
+            let mut options =
+                CaptureOptions { width: size, height: size, samples, ..Default::default() };
             options.splats = SplatRules::parse(rules).unwrap();
             let capture = Capture::new(&scene, &options).unwrap();
             let mut times = vec![];
@@ -23,7 +24,13 @@ fn main() {
             for _ in 0..reps {
                 let t = Instant::now();
                 let w = pool.install(|| {
-                    let mut w = TraceWriter::new(Null, "x", capture.header().clone(), WriteOptions::default()).unwrap();
+                    let mut w = TraceWriter::new(
+                        Null,
+                        "x",
+                        capture.header().clone(),
+                        WriteOptions::default(),
+                    )
+                    .unwrap();
                     capture.draw(&mut w, |_, _| ()).unwrap();
                     w.finish().unwrap().1
                 });
@@ -33,12 +40,23 @@ fn main() {
             times.sort_by(f64::total_cmp);
             let w = last.unwrap();
             let t = times[times.len() / 2];
-            println!("{spec} s{samples} t{threads} rows {} ms {:.1} M/s {:.3} {} {}", w.rows, t * 1e3, w.rows as f64 / t / 1e6, &w.content[..16], w.bytes);
+            println!(
+                "{spec} s{samples} t{threads} rows {} ms {:.1} M/s {:.3} {} {}",
+                w.rows,
+                t * 1e3,
+                w.rows as f64 / t / 1e6,
+                &w.content[..16],
+                w.bytes
+            );
         }
     }
 }
 struct Null;
 impl Write for Null {
-    fn write(&mut self, b: &[u8]) -> std::io::Result<usize> { Ok(b.len()) }
-    fn flush(&mut self) -> std::io::Result<()> { Ok(()) }
+    fn write(&mut self, b: &[u8]) -> std::io::Result<usize> {
+        Ok(b.len())
+    }
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
 }

@@ -7,8 +7,8 @@ use glam::Vec2;
 
 use crate::capture::geometry::Triangle;
 use crate::capture::lanes::{
-    Doubles, LANES, Singles, at_least, at_most, dot_with, narrow, normalize_doubles,
-    four, normalize_singles, splat_point, splat3, three,
+    Doubles, LANES, Singles, at_least, at_most, dot_with, four, narrow, normalize_doubles,
+    normalize_singles, splat_point, splat3, three,
 };
 use crate::capture::raster::Raster;
 use crate::capture::scan::Covered;
@@ -69,7 +69,8 @@ impl<'p> Batch<'p> {
         let t = raster.triangle;
         let step = STEPS as f64 / t.area as f64;
         let scaled = |slope: fn(&[i64; 2]) -> f64| {
-            let of = |i: usize| slope(&[raster.edges[i].a, raster.edges[i].b]) * step * t.inverse_w[i];
+            let of =
+                |i: usize| slope(&[raster.edges[i].a, raster.edges[i].b]) * step * t.inverse_w[i];
             let scaled = [of(0), of(1), of(2)];
             (scaled, scaled[0] + scaled[1] + scaled[2])
         };
@@ -217,7 +218,11 @@ impl<'p> Batch<'p> {
             #[inline(always)]
             |i| scaled[i] / sum,
         );
-        let at = [self.of_vertex(simd, values, 0), self.of_vertex(simd, values, 1), self.of_vertex(simd, values, 2)];
+        let at = [
+            self.of_vertex(simd, values, 0),
+            self.of_vertex(simd, values, 1),
+            self.of_vertex(simd, values, 2),
+        ];
         let zero = Singles::splat(simd, 0.0);
         if !changes {
             return Weights { at, changes: [[zero; 2]; 2] };
@@ -248,8 +253,8 @@ impl<'p> Batch<'p> {
     #[inline(always)]
     fn of_vertex<S: Simd>(&self, simd: S, by: [Doubles<S>; 3], k: usize) -> Doubles<S> {
         let mut sum = Doubles::splat(simd, 0.0);
-        for i in 0..3 {
-            sum += by[i] * self.raster.triangle.weights[i][k];
+        for (by, corner) in by.iter().zip(&self.raster.triangle.weights) {
+            sum += *by * corner[k];
         }
         sum
     }

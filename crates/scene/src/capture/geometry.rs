@@ -82,7 +82,9 @@ impl<'a> Geometry<'a> {
         let shape = &self.scene.shapes[object.shape];
         let vertices = match shape {
             Shape::Mesh(mesh) => mesh_triangle(mesh, local, &self.places[index]),
-            Shape::Strands(strands) => strand_triangle(strands, local, &self.places[index], self.camera),
+            Shape::Strands(strands) => {
+                strand_triangle(strands, local, &self.places[index], self.camera)
+            }
             Shape::Particles(particles) => {
                 particle_triangle(particles, local, &self.places[index], self.camera)
             }
@@ -185,15 +187,14 @@ fn strand_triangle(
         let across = along.cross(towards).normalize_or(camera.right);
         (i, at(i), across, towards, f64::from(strands.radii[i]) * scale)
     };
-    let vertex = |(i, at, across, towards, width): (usize, DVec3, DVec3, DVec3, f64), side: f64| {
-        Vertex {
+    let vertex =
+        |(i, at, across, towards, width): (usize, DVec3, DVec3, DVec3, f64), side: f64| Vertex {
             position: at + across * (side * width),
             normal: (towards + across * (side * RIBBON_ROUNDNESS)).as_vec3(),
             uvs: [Vec2::new(side as f32 * 0.5 + 0.5, (i - first) as f32 / (end - 1 - first) as f32);
                 2],
             colour: strands.colours.get(own(i)).copied().unwrap_or(Vec4::ONE),
-        }
-    };
+        };
     let (low, high) = (joint(point), joint(point + 1));
     if local.is_multiple_of(2) {
         [vertex(low, -1.0), vertex(low, 1.0), vertex(high, 1.0)]
@@ -238,7 +239,9 @@ fn particle_triangle(
     let i = local as usize / 2;
     let centre = place.points.transform_point3(particles.centres[i].as_dvec3());
     let (angle, size) = match particles.axes.get(i) {
-        Some(axes) => outline(&(place.points.matrix3 * axes.as_dmat3()), camera, camera.towards(centre)),
+        Some(axes) => {
+            outline(&(place.points.matrix3 * axes.as_dmat3()), camera, camera.towards(centre))
+        }
         None => {
             let size = f64::from(particles.sizes[i]) * place.scale;
             (particles.angles.get(i).map_or(0.0, |a| f64::from(*a)), [size; 2])

@@ -46,6 +46,7 @@ impl Tools<'_> {
 }
 
 /// A primitive and what is left of it on the frame.
+#[expect(clippy::large_enum_variant, reason = "a scene has mostly one kind")]
 pub(super) enum Drawn {
     Triangle {
         triangle: Triangle,

@@ -14,6 +14,8 @@ mod job;
 mod lanes;
 mod order;
 mod pattern;
+#[cfg(test)]
+mod plain;
 mod raster;
 mod samples;
 mod scan;

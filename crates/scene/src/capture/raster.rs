@@ -115,11 +115,7 @@ pub(crate) struct Hit {
 
 impl<'a> Raster<'a> {
     #[inline(always)]
-    pub(super) fn new(
-        triangle: &'a ScreenTriangle,
-        samples: &'a Samples,
-        size: [u32; 2],
-    ) -> Self {
+    pub(super) fn new(triangle: &'a ScreenTriangle, samples: &'a Samples, size: [u32; 2]) -> Self {
         let [p0, p1, p2] = triangle.corners;
         let edge = |from, to| Edge::new(from, to, samples);
         Raster {
@@ -149,11 +145,7 @@ impl<'a> Raster<'a> {
             let values = self.edges.map(|e| e.at(centre));
             let all_inside =
                 self.edges.iter().zip(values).all(|(e, value)| value + e.spread[0] >= 0);
-            let coverage = if all_inside {
-                self.samples.all()
-            } else {
-                self.coverage(values)
-            };
+            let coverage = if all_inside { self.samples.all() } else { self.coverage(values) };
             if coverage.is_empty() {
                 continue;
             }
@@ -394,8 +386,10 @@ mod tests {
             for (i, n) in counts.iter().enumerate() {
                 let (pixel, s) = (i / samples.offsets.len(), i % samples.offsets.len());
                 let (x, y) = ((pixel % 16) as i64, (pixel / 16) as i64);
-                let p =
-                    [x * STEPS + STEPS / 2 + samples.offsets[s][0], y * STEPS + STEPS / 2 + samples.offsets[s][1]];
+                let p = [
+                    x * STEPS + STEPS / 2 + samples.offsets[s][0],
+                    y * STEPS + STEPS / 2 + samples.offsets[s][1],
+                ];
                 assert_eq!(*n, u32::from(inside(corners, p)), "round {round}, {corners:?}, {p:?}");
             }
         }

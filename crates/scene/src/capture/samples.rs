@@ -92,8 +92,7 @@ mod tests {
     #[test]
     fn the_nearest_of_some_samples_is_found() {
         for count in [1, 2, 4, 8, 16, 32, 64] {
-            let samples =
-                Samples::new(&pattern(PatternKind::Auto, count).unwrap().positions);
+            let samples = Samples::new(&pattern(PatternKind::Auto, count).unwrap().positions);
             let mut random = screendoor_trace::random::Stream::new([5]);
             for _ in 0..200 {
                 let bits = u64::from(random.word()) << 32 | u64::from(random.word());

@@ -68,9 +68,7 @@ impl<'r, 'a> Scan<'r, 'a> {
         for i in (0..self.raster.samples.padded).step_by(VECTOR) {
             let [a, b, c] = three(
                 #[inline(always)]
-                |k| {
-                    i32x16::from_slice(simd, &self.changes[k][i..i + VECTOR]).simd_ge(least[k])
-                },
+                |k| i32x16::from_slice(simd, &self.changes[k][i..i + VECTOR]).simd_ge(least[k]),
             );
             mask |= (a & b & c).to_bitmask() << i;
         }

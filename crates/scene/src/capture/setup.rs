@@ -76,12 +76,7 @@ impl Pieces {
 /// Clips `triangle` against the near plane and the guard band, projects it and
 /// snaps it to the sub-pixel grid; `keep_back` says whether a triangle that shows
 /// its back is drawn. Adds what is left to `out`.
-pub(crate) fn set_up(
-    triangle: &Triangle,
-    camera: &Camera,
-    keep_back: bool,
-    out: &mut Pieces,
-) {
+pub(crate) fn set_up(triangle: &Triangle, camera: &Camera, keep_back: bool, out: &mut Pieces) {
     let mut polygon = Polygon::new();
     for (i, vertex) in triangle.vertices.iter().enumerate() {
         let clip = camera.to_clip * vertex.position.extend(1.0);
@@ -101,7 +96,8 @@ pub(crate) fn set_up(
     if polygon.len() < 3 {
         return;
     }
-    let snapped: ArrayVec<[i64; 2], MOST_CORNERS> = polygon.iter().map(|c| snap(c.clip, camera.size)).collect();
+    let snapped: ArrayVec<[i64; 2], MOST_CORNERS> =
+        polygon.iter().map(|c| snap(c.clip, camera.size)).collect();
     let (apex, whole) = apex(&snapped);
     // Counter-clockwise with y upwards is the front: that is a negative area with
     // y downwards.

@@ -262,9 +262,8 @@ impl Texture {
         let mut colours = [Vec4::ZERO; N];
         for i in 0..count {
             let level = &self.levels[levels[i]];
-            let row = |y: u32| {
-                level.texel(x.low[i], y).lerp(level.texel(x.high[i], y), x.weight[i])
-            };
+            let row =
+                |y: u32| level.texel(x.low[i], y).lerp(level.texel(x.high[i], y), x.weight[i]);
             colours[i] = row(y.low[i]).lerp(row(y.high[i]), y.weight[i]);
         }
         Some(colours)
@@ -327,6 +326,7 @@ impl Level {
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
+    use screendoor_trace::random::Stream;
 
     use super::*;
 
@@ -347,6 +347,45 @@ mod tests {
         assert_eq!(at(4.5, 0.5), 1.0);
         assert_eq!(at(-0.5, 0.5), 0.0);
         assert!((at(0.0, 0.5) - 0.5).abs() < 1e-6);
+    }
+
+    #[test]
+    fn several_texels_are_those_of_each() {
+        let mut random = Stream::new([0x7e4]);
+        let mut real = |scale: f32| (random.word() as f32 / 2.2e9 - 0.98) * scale;
+        for (round, [width, height]) in [[1, 1], [2, 3], [16, 5], [31, 64]].into_iter().enumerate()
+        {
+            let texture = Texture::from_fn(width, height, |x, y| {
+                let value = |k: u32| ((x * 7 + y * 13 + k * 5) % 11) as f32 / 10.0;
+                Vec4::new(value(0), value(1), value(2), value(3))
+            });
+            for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
+                for magnify in [Filter::Linear, Filter::Nearest] {
+                    let sampling = Sampling {
+                        wrap: [wrap, Wrap::Repeat],
+                        magnify,
+                        levels: [Some(Filter::Linear), Some(Filter::Nearest), None][round % 3],
+                        ..Sampling::default()
+                    };
+                    let texture = texture.clone().sampled(sampling);
+                    for i in 0..300 {
+                        // Coordinates that no vector is for now and then.
+                        let reach = [1.0, 3.0, 300.0, 1e12, f32::INFINITY][i % 5];
+                        let mut lanes = |scale| [[0.0_f32; 8]; 2].map(|v| v.map(|_| real(scale)));
+                        let (uv, size) = (lanes(reach), [0.001, 0.1, 2.0, 1e30][i % 4]);
+                        let (dx, dy) = (lanes(size), lanes(size));
+                        let count = i % 9;
+                        let found = texture.sample_each(&uv, &dx, &dy, count);
+                        for (k, found) in found[..count].iter().enumerate() {
+                            let at = |v: &[[f32; 8]; 2]| Vec2::new(v[0][k], v[1][k]);
+                            let wanted = texture.sample(at(&uv), at(&dx), at(&dy));
+                            let bits = |v: Vec4| v.to_array().map(f32::to_bits);
+                            assert_eq!(bits(*found), bits(wanted), "{sampling:?} {uv:?}");
+                        }
+                    }
+                }
+            }
+        }
     }
 
     #[test]

@@ -320,7 +320,12 @@ impl OnFrame {
 
     /// [`OnFrame::alpha`] at several offsets: the alphas, and a bit for each that is drawn.
     #[inline(always)]
-    fn alphas(&self, rules: &SplatRules, dx: &[f64; LANES], dy: &[f64; LANES]) -> ([f32; LANES], u64) {
+    fn alphas(
+        &self,
+        rules: &SplatRules,
+        dx: &[f64; LANES],
+        dy: &[f64; LANES],
+    ) -> ([f32; LANES], u64) {
         let (mut alphas, mut drawn) = ([0.0; LANES], 0);
         if self.reach > -2.0 * LEAST_EXPONENT {
             for i in 0..LANES {
@@ -334,7 +339,7 @@ impl OnFrame {
         let mut within = [false; LANES];
         for i in 0..LANES {
             let q = self.q(dx[i], dy[i]);
-            within[i] = !(q > self.reach);
+            within[i] = q <= self.reach || q.is_nan();
             // What is beyond its reach is not used.
             values[i] = elementary::exp((-q.max(0.0) / 2.0).max(LEAST_EXPONENT));
         }
@@ -400,6 +405,53 @@ impl OnFrame {
                 fragments.push(Fragment { x: x as u16, coverage, depth, alpha, ..of });
             }
             first += count;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::capture::lanes::levels;
+    use fearless_simd::dispatch;
+    use screendoor_trace::random::Stream;
+
+    #[test]
+    fn several_alphas_are_those_of_each() {
+        let mut random = Stream::new([0x5b1a7]);
+        let mut real = |low: f64, high: f64| low + f64::from(random.word()) / 4.3e9 * (high - low);
+        for set in RULE_SETS {
+            let rules = SplatRules::parse(set.name).unwrap();
+            for _ in 0..200 {
+                let (xx, yy) = (real(0.3, 40.0), real(0.3, 40.0));
+                let xy = real(-0.99, 0.99) * (xx * yy).sqrt();
+                let (whole, opacity) = (xx * yy - xy * xy, real(0.01, 1.0));
+                let Some(reach) = rules.reach(opacity) else { continue };
+                let splat = OnFrame {
+                    centre: DVec2::ZERO,
+                    covariance: [xx, xy, yy],
+                    conic: [yy / whole, -xy / whole, xx / whole],
+                    opacity,
+                    colour: [0.5; 3],
+                    distance: 1.0,
+                    // Beyond what vectors are for, too.
+                    reach: if real(0.0, 1.0) < 0.1 { 5000.0 } else { reach },
+                    depth: 0.5,
+                    slopes: [0.0; 2],
+                    columns: (0, 9),
+                    rows: (0, 9),
+                };
+                let far = real(0.1, 60.0);
+                let mut offset = || std::array::from_fn(|_| real(-far, far));
+                let (dx, dy): ([f64; LANES], [f64; LANES]) = (offset(), offset());
+                for level in levels() {
+                    let (alphas, drawn) = dispatch!(level, _ => splat.alphas(&rules, &dx, &dy));
+                    for i in 0..LANES {
+                        let found = (drawn >> i & 1 == 1).then_some(alphas[i]);
+                        assert_eq!(found, splat.alpha(&rules, dx[i], dy[i]), "{}", set.name);
+                    }
+                }
+            }
         }
     }
 }
