@@ -140,7 +140,7 @@ struct Part {
 }
 
 /// Cuts the drawing of a chunk into jobs of about equal size, in drawing order.
-/// The cuts depend on the primitives alone, not on the threads.
+/// Neither the fragments nor their order depend on where the cuts are.
 pub(super) fn cut_into_jobs(drawn: &[Drawn], tools: &Tools<'_>) -> Vec<Job> {
     let mut jobs = vec![Job::default()];
     for (i, d) in drawn.iter().enumerate() {

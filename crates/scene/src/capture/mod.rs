@@ -3,8 +3,12 @@
 //! A rasteriser by the rules of Direct3D and Vulkan on fixed-point coordinates,
 //! with one shading per fragment. Fragments come out in API order (or in the
 //! order asked for), the same ones whatever the number of threads, and go
-//! straight into a [`TraceWriter`]: memory is bounded by the scene and a few
-//! million pixels' worth of work in flight.
+//! straight into a [`TraceWriter`]: memory is bounded by the scene and some ten
+//! thousand pixels' worth of work in flight for each thread.
+//!
+//! Triangles are drawn in vectors (`scan`, `batch`). `raster` and `shade` hold the
+//! plain text of that, which other rasterisers' coverage is shaded by and tests hold
+//! the vectors to, bit for bit.
 
 mod batch;
 mod camera;

@@ -234,10 +234,11 @@ fn arrow_error(place: &str, error: ArrowError) -> Error {
 mod tests {
     use super::*;
     use crate::random::Stream;
-    use crate::trace::{SampleMask, Scalar};
+    use crate::trace::{SampleMask, SamplePattern, Scalar};
 
     fn header() -> Header {
-        let mut header = Header { width: 64, height: 64, ..Header::default() };
+        let pattern = SamplePattern::standard(1).unwrap();
+        let mut header = Header { width: 64, height: 64, pattern, ..Header::default() };
         header.constants.insert(ColumnId::Object, Scalar::Unsigned(3));
         header
     }
