@@ -4,4 +4,5 @@
 #![warn(missing_docs)]
 
 pub mod capture;
+mod elementary;
 pub mod scene;

@@ -4,8 +4,9 @@ use glam::{DVec3, DVec4};
 
 use crate::capture::geometry::{Geometry, Primitive, Triangle};
 use crate::capture::raster::{Raster, Weights};
+use crate::capture::samples::Samples;
+use crate::capture::setup::Pieces;
 use crate::capture::setup::STEPS;
-use crate::capture::setup::ScreenTriangle;
 use crate::capture::shade::Shader;
 use crate::capture::{Capture, order};
 use screendoor_trace::error::{Error, Result};
@@ -24,9 +25,8 @@ pub struct SetUp<'a> {
     drawing: &'a Drawing<'a>,
     triangle: Triangle,
     /// What clipping left of it.
-    pieces: Vec<ScreenTriangle>,
-    /// The samples' places in sub-pixel steps from the pixel's centre.
-    offsets: Vec<[i64; 2]>,
+    pieces: Pieces,
+    samples: Samples,
 }
 
 impl Capture<'_> {
@@ -78,8 +78,7 @@ impl Drawing<'_> {
     pub fn set_up(&self, i: usize, positions: &[[i8; 2]]) -> SetUp<'_> {
         let triangle = self.triangle(i);
         let pieces = self.capture.set_up(&triangle, &self.shader);
-        let offsets = positions.iter().map(|p| p.map(|v| i64::from(v) * STEPS / 16)).collect();
-        SetUp { drawing: self, triangle, pieces, offsets }
+        SetUp { drawing: self, triangle, pieces, samples: Samples::new(positions) }
     }
 
     fn triangle(&self, i: usize) -> Triangle {
@@ -94,7 +93,7 @@ impl SetUp<'_> {
     fn rasters(&self) -> impl Iterator<Item = Raster<'_>> {
         let options = self.drawing.capture.options;
         let size = [options.width, options.height];
-        self.pieces.iter().map(move |piece| Raster::new(piece, &self.offsets, size))
+        self.pieces.iter().map(move |piece| Raster::new(piece, &self.samples, size))
     }
 
     /// Whether nothing is left of it on our grid.
@@ -160,7 +159,7 @@ impl SetUp<'_> {
     /// How far a sample of a pixel lies from the nearest edge, in sub-pixel steps.
     pub fn distance(&self, [x, y]: [u16; 2], sample: usize) -> f64 {
         let at = |v: u16, o: i64| i64::from(v) * STEPS + STEPS / 2 + o;
-        let [dx, dy] = self.offsets[sample];
+        let [dx, dy] = self.samples.offsets[sample];
         let point = [at(x, dx), at(y, dy)];
         self.rasters().map(|raster| raster.distance(point)).fold(f64::INFINITY, f64::min)
     }

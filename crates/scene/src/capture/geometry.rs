@@ -82,9 +82,11 @@ impl<'a> Geometry<'a> {
         let shape = &self.scene.shapes[object.shape];
         let vertices = match shape {
             Shape::Mesh(mesh) => mesh_triangle(mesh, local, &self.places[index]),
-            Shape::Strands(strands) => strand_triangle(strands, local, &object.place, self.camera),
+            Shape::Strands(strands) => {
+                strand_triangle(strands, local, &self.places[index], self.camera)
+            }
             Shape::Particles(particles) => {
-                particle_triangle(particles, local, &object.place, self.camera)
+                particle_triangle(particles, local, &self.places[index], self.camera)
             }
             Shape::Splats(splats) => {
                 let (index, object) = (local as usize, index as u32);
@@ -114,6 +116,8 @@ impl<'a> Geometry<'a> {
 struct Placement {
     points: DAffine3,
     normals: DMat3,
+    /// What lengths are multiplied by, on average over the directions.
+    scale: f64,
     /// A mirrored mesh winds the other way round (glTF 2.0, section 3.7.4).
     mirrored: bool,
 }
@@ -130,7 +134,8 @@ impl Placement {
             m.z_axis.cross(m.x_axis) * sign,
             m.x_axis.cross(m.y_axis) * sign,
         );
-        Placement { points, normals, mirrored }
+        let scale = m.determinant().abs().cbrt();
+        Placement { points, normals, scale, mirrored }
     }
 }
 
@@ -162,7 +167,7 @@ const RIBBON_ROUNDNESS: f64 = 0.9;
 fn strand_triangle(
     strands: &Strands,
     local: u32,
-    place: &DAffine3,
+    place: &Placement,
     camera: &Camera,
 ) -> [Vertex; 3] {
     // Segment `s` of curve `c` has the number starts[c] − c + s.
@@ -170,25 +175,27 @@ fn strand_triangle(
     let curve = partition(strands.strand_count(), |c| strands.starts[c] - c as u32 <= segment) - 1;
     let (first, end) = (strands.starts[curve] as usize, strands.starts[curve + 1] as usize);
     let point = segment as usize + curve;
-    let at = |i: usize| place.transform_point3(strands.points[i].as_dvec3());
-    let scale = place.matrix3.determinant().abs().cbrt();
+    let at = |i: usize| place.points.transform_point3(strands.points[i].as_dvec3());
+    let scale = place.scale;
     // Curves have two points at least, so that it is clear which of both there is one for.
     let own = |i: usize| if strands.colours.len() == strands.points.len() { i } else { curve };
-    let vertex = |i: usize, side: f64| {
+    // A point, which way its ribbon goes and to where it is seen from, and its width.
+    let joint = |i: usize| {
         // The curve's direction at a joint: from the point before to the point after.
         let along = at((i + 1).min(end - 1)) - at(i.max(first + 1) - 1);
         let towards = camera.towards(at(i));
         let across = along.cross(towards).normalize_or(camera.right);
-        let width = f64::from(strands.radii[i]) * scale;
-        Vertex {
-            position: at(i) + across * (side * width),
+        (i, at(i), across, towards, f64::from(strands.radii[i]) * scale)
+    };
+    let vertex =
+        |(i, at, across, towards, width): (usize, DVec3, DVec3, DVec3, f64), side: f64| Vertex {
+            position: at + across * (side * width),
             normal: (towards + across * (side * RIBBON_ROUNDNESS)).as_vec3(),
             uvs: [Vec2::new(side as f32 * 0.5 + 0.5, (i - first) as f32 / (end - 1 - first) as f32);
                 2],
             colour: strands.colours.get(own(i)).copied().unwrap_or(Vec4::ONE),
-        }
-    };
-    let (low, high) = (point, point + 1);
+        };
+    let (low, high) = (joint(point), joint(point + 1));
     if local.is_multiple_of(2) {
         [vertex(low, -1.0), vertex(low, 1.0), vertex(high, 1.0)]
     } else {
@@ -226,15 +233,17 @@ fn partition(count: usize, holds: impl Fn(usize) -> bool) -> usize {
 fn particle_triangle(
     particles: &Particles,
     local: u32,
-    place: &DAffine3,
+    place: &Placement,
     camera: &Camera,
 ) -> [Vertex; 3] {
     let i = local as usize / 2;
-    let centre = place.transform_point3(particles.centres[i].as_dvec3());
+    let centre = place.points.transform_point3(particles.centres[i].as_dvec3());
     let (angle, size) = match particles.axes.get(i) {
-        Some(axes) => outline(&(place.matrix3 * axes.as_dmat3()), camera, camera.towards(centre)),
+        Some(axes) => {
+            outline(&(place.points.matrix3 * axes.as_dmat3()), camera, camera.towards(centre))
+        }
         None => {
-            let size = f64::from(particles.sizes[i]) * place.matrix3.determinant().abs().cbrt();
+            let size = f64::from(particles.sizes[i]) * place.scale;
             (particles.angles.get(i).map_or(0.0, |a| f64::from(*a)), [size; 2])
         }
     };

@@ -1,16 +1,23 @@
 //! The drawing of a chunk of primitives, cut into jobs that threads do.
 
+use fearless_simd::{Level, Simd, dispatch};
+
+use crate::capture::batch::{Batch, Hits};
 use crate::capture::geometry::{Splat, Triangle};
-use crate::capture::raster::Raster;
-use crate::capture::setup::ScreenTriangle;
+use crate::capture::raster::{Bounds, Raster};
+use crate::capture::samples::{MOST, Samples};
+use crate::capture::scan::{Changes, Scan};
+use crate::capture::setup::{Pieces, ScreenTriangle};
 use crate::capture::shade::Shader;
 use crate::capture::splat::{Nothing, OnFrame, Painter, Placed, SplatRules};
 use screendoor_trace::trace::Fragment;
 
 /// Pixels of bounding boxes that one job rasterises.
 const JOB_PIXELS: i64 = 1 << 13;
-/// Pixels of bounding boxes that are in flight at a time.
-const WAVE_PIXELS: i64 = 1 << 19;
+/// What setting a triangle up costs, in pixels.
+const SET_UP: i64 = 8;
+/// Jobs that are in flight at a time, for each thread.
+const WAVE: usize = 4;
 
 /// What a capture draws with.
 pub(super) struct Tools<'a> {
@@ -19,8 +26,10 @@ pub(super) struct Tools<'a> {
     /// Each object's place, for its splats.
     pub(super) placed: Vec<Placed>,
     pub(super) rules: &'a SplatRules,
-    /// The samples' places from the pixel's centre, in sub-pixel steps and in pixels.
-    pub(super) steps: Vec<[i64; 2]>,
+    /// The instructions that there are.
+    pub(super) level: Level,
+    pub(super) samples: Samples,
+    /// The samples' places from the pixel's centre, in pixels.
     pub(super) pixels: Vec<[f64; 2]>,
     /// The frame's, in pixels.
     pub(super) size: [u32; 2],
@@ -32,22 +41,29 @@ impl Tools<'_> {
     }
 
     pub(super) fn raster<'p>(&'p self, piece: &'p ScreenTriangle) -> Raster<'p> {
-        Raster::new(piece, &self.steps, self.size)
+        Raster::new(piece, &self.samples, self.size)
     }
 }
 
 /// A primitive and what is left of it on the frame.
+#[expect(clippy::large_enum_variant, reason = "a scene has mostly one kind")]
 pub(super) enum Drawn {
     Triangle {
         triangle: Triangle,
         /// What clipping left of it.
-        pieces: Vec<ScreenTriangle>,
+        pieces: Pieces,
     },
     Splat {
         on_frame: std::result::Result<OnFrame, Nothing>,
         object: u32,
         primitive: u32,
     },
+}
+
+/// What a job works in, made once for all of its triangles.
+struct Room {
+    changes: Changes,
+    hits: Hits,
 }
 
 /// The rows that something may touch, empty where they cross, and the pixels of each.
@@ -57,54 +73,51 @@ struct Extent {
 }
 
 impl Drawn {
-    /// The extent of each piece.
-    fn extents(&self, tools: &Tools<'_>) -> Vec<Extent> {
+    /// Tells the extent of each piece.
+    fn extents(&self, tools: &Tools<'_>, mut tell: impl FnMut(Extent)) {
         match self {
-            Drawn::Triangle { pieces, .. } => {
-                let extent = |piece| {
-                    let raster = tools.raster(piece);
-                    Extent { rows: raster.rows(), columns: raster.columns() }
-                };
-                pieces.iter().map(extent).collect()
+            Drawn::Triangle { pieces, .. } => pieces.iter().for_each(|piece| {
+                let bounds = Bounds::new(piece, tools.size);
+                tell(Extent { rows: bounds.rows(), columns: bounds.width() });
+            }),
+            Drawn::Splat { on_frame: Ok(s), .. } => {
+                tell(Extent { rows: s.rows(), columns: s.columns() });
             }
-            Drawn::Splat { on_frame, .. } => {
-                let extent = |s: &OnFrame| Extent { rows: s.rows(), columns: s.columns() };
-                on_frame.iter().map(extent).collect()
-            }
+            Drawn::Splat { on_frame: Err(_), .. } => {}
         }
     }
 
     /// Its fragments in some rows of a piece.
-    fn fragments(&self, part: &Part, tools: &Tools<'_>, fragments: &mut Vec<Fragment>) {
+    #[inline(always)]
+    fn fragments<S: Simd>(
+        &self,
+        simd: S,
+        part: &Part,
+        tools: &Tools<'_>,
+        room: &mut Room,
+        fragments: &mut Vec<Fragment>,
+    ) {
         match self {
             Drawn::Triangle { triangle, pieces } => {
-                let raster = tools.raster(&pieces[part.piece]);
+                let raster = tools.raster(pieces.get(part.piece));
+                let scan = Scan::new(simd, &raster, &mut room.changes);
+                let mut batch = Batch::new(&raster, triangle, &tools.shader, &mut room.hits);
                 for y in part.rows.0..=part.rows.1 {
-                    raster.row(y, |hit| {
-                        let weights = raster.weights(hit.shade_at);
-                        let shaded = tools.shader.shade(triangle, &weights);
-                        let Some((colour, alpha)) = shaded else { return };
-                        fragments.push(Fragment {
-                            x: hit.x,
-                            y: hit.y,
-                            coverage: hit.coverage,
-                            depth: hit.depth,
-                            colour,
-                            alpha,
-                            primitive: triangle.primitive,
-                            object: triangle.object,
-                            ..Fragment::default()
-                        });
-                    });
+                    scan.row(
+                        simd,
+                        y,
+                        #[inline(always)]
+                        |covered| batch.add(simd, y, covered, fragments),
+                    );
                 }
+                batch.finish(simd, fragments);
             }
             Drawn::Splat { on_frame, object, primitive } => {
                 let Ok(splat) = on_frame else { return };
                 let (object, primitive) = (*object, *primitive);
                 let of = Fragment { object, primitive, ..Fragment::default() };
                 for y in part.rows.0..=part.rows.1 {
-                    let push = |fragment| fragments.push(fragment);
-                    splat.row(y, tools.rules, &tools.pixels, of, push);
+                    splat.row(y, tools.rules, &tools.pixels, of, fragments);
                 }
             }
         }
@@ -127,11 +140,12 @@ struct Part {
 }
 
 /// Cuts the drawing of a chunk into jobs of about equal size, in drawing order.
-/// The cuts depend on the primitives alone, not on the threads.
+/// Neither the fragments nor their order depend on where the cuts are.
 pub(super) fn cut_into_jobs(drawn: &[Drawn], tools: &Tools<'_>) -> Vec<Job> {
     let mut jobs = vec![Job::default()];
     for (i, d) in drawn.iter().enumerate() {
-        for (k, extent) in d.extents(tools).into_iter().enumerate() {
+        let mut piece = 0;
+        d.extents(tools, |extent| {
             let (mut row, last) = extent.rows;
             let columns = extent.columns;
             while row <= last {
@@ -142,29 +156,28 @@ pub(super) fn cut_into_jobs(drawn: &[Drawn], tools: &Tools<'_>) -> Vec<Job> {
                 }
                 let room = ((JOB_PIXELS - job.pixels) / columns).max(1);
                 let end = (row + room - 1).min(last);
-                job.parts.push(Part { drawn: i, piece: k, rows: (row, end) });
-                job.pixels += (end - row + 1) * columns;
+                job.parts.push(Part { drawn: i, piece, rows: (row, end) });
+                job.pixels += (end - row + 1) * columns + SET_UP;
                 row = end + 1;
             }
-        }
+            piece += 1;
+        });
     }
     jobs
 }
 
-/// How many of `jobs` make up a wave.
+/// How many of `jobs` make up a wave: enough that no thread waits, and few enough that what they
+/// make is still in the caches when it is written.
 pub(super) fn wave_length(jobs: &[Job]) -> usize {
-    let mut pixels = 0;
-    let full = jobs.iter().position(|job| {
-        pixels += job.pixels;
-        pixels >= WAVE_PIXELS
-    });
-    full.map_or(jobs.len(), |last| last + 1)
+    jobs.len().min(WAVE * rayon::current_num_threads())
 }
 
 impl Job {
-    pub(super) fn run(&self, drawn: &[Drawn], tools: &Tools<'_>) -> Vec<Fragment> {
-        let mut fragments = Vec::new();
-        self.parts.iter().for_each(|part| drawn[part.drawn].fragments(part, tools, &mut fragments));
-        fragments
+    /// Adds what it draws to `fragments`.
+    pub(super) fn run(&self, drawn: &[Drawn], tools: &Tools<'_>, fragments: &mut Vec<Fragment>) {
+        let mut room = Room { changes: [[0; MOST]; 3], hits: Hits::default() };
+        dispatch!(tools.level, simd => for part in &self.parts {
+            drawn[part.drawn].fragments(simd, part, tools, &mut room, fragments);
+        });
     }
 }

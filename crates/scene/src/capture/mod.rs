@@ -3,16 +3,26 @@
 //! A rasteriser by the rules of Direct3D and Vulkan on fixed-point coordinates,
 //! with one shading per fragment. Fragments come out in API order (or in the
 //! order asked for), the same ones whatever the number of threads, and go
-//! straight into a [`TraceWriter`]: memory is bounded by the scene and a few
-//! million pixels' worth of work in flight.
+//! straight into a [`TraceWriter`]: memory is bounded by the scene and some ten
+//! thousand pixels' worth of work in flight for each thread.
+//!
+//! Triangles are drawn in vectors (`scan`, `batch`). `raster` and `shade` hold the
+//! plain text of that, which other rasterisers' coverage is shaded by and tests hold
+//! the vectors to, bit for bit.
 
+mod batch;
 mod camera;
 mod covered;
 mod geometry;
 mod job;
+mod lanes;
 mod order;
 mod pattern;
+#[cfg(test)]
+mod plain;
 mod raster;
+mod samples;
+mod scan;
 mod setup;
 mod shade;
 mod splat;
@@ -20,6 +30,7 @@ mod unseen;
 
 use std::io::Write;
 
+use fearless_simd::Level;
 use rayon::prelude::*;
 
 pub use camera::{Camera, CameraChoice, CameraOptions, Chosen, Pose};
@@ -31,7 +42,8 @@ pub use unseen::Unseen;
 
 use crate::capture::geometry::{Geometry, Primitive, Triangle};
 use crate::capture::job::{Drawn, Tools, cut_into_jobs, wave_length};
-use crate::capture::setup::{STEPS, ScreenTriangle, set_up};
+use crate::capture::samples::Samples;
+use crate::capture::setup::{Pieces, set_up};
 use crate::capture::shade::Shader;
 use crate::capture::splat::Painter;
 use crate::capture::unseen::Recorded;
@@ -130,8 +142,8 @@ pub struct Capture<'a> {
     recorded: Recorded,
 }
 
-/// Triangles and splats set up at a time.
-const CHUNK: usize = 1 << 14;
+/// Triangles and splats set up at a time, for each thread: as many as its cache holds.
+const CHUNK: usize = 1 << 11;
 impl<'a> Capture<'a> {
     /// Places the camera and makes the trace's header.
     ///
@@ -204,10 +216,11 @@ impl<'a> Capture<'a> {
         let total = geometry.len() as usize;
         let number = |i: usize| order.as_ref().map_or(i as u32, |order| order[i]);
 
-        // What the previous wave made, written while this one is drawn.
-        let mut finished: Vec<Vec<Fragment>> = Vec::new();
-        for start in (0..total).step_by(CHUNK) {
-            let end = (start + CHUNK).min(total);
+        // What the previous wave made, written while this one is drawn. Both keep their memory.
+        let [mut finished, mut drawing] = [const { Vec::<Vec<Fragment>>::new() }; 2];
+        let chunk = CHUNK * rayon::current_num_threads();
+        for start in (0..total).step_by(chunk) {
+            let end = (start + chunk).min(total);
             let drawn: Vec<Drawn> = (start..end)
                 .into_par_iter()
                 .map(|i| self.prepare(geometry.primitive(number(i)), &tools))
@@ -217,21 +230,22 @@ impl<'a> Capture<'a> {
             while !rest.is_empty() {
                 let (wave, later) = rest.split_at(wave_length(rest));
                 rest = later;
-                let mut done = Vec::new();
+                drawing.iter_mut().for_each(Vec::clear);
+                drawing.resize_with(drawing.len().max(wave.len()), Vec::new);
                 let (written, ()) = rayon::join(
-                    || self.write_all(writer, std::mem::take(&mut finished)),
+                    || self.write_all(writer, &finished),
                     || {
                         wave.par_iter()
-                            .map(|job| job.run(&drawn, &tools))
-                            .collect_into_vec(&mut done);
+                            .zip(&mut drawing)
+                            .for_each(|(job, fragments)| job.run(&drawn, &tools, fragments));
                     },
                 );
                 written?;
-                finished = done;
+                std::mem::swap(&mut finished, &mut drawing);
             }
             progress(end as u64, total as u64);
         }
-        self.write_all(writer, finished)
+        self.write_all(writer, &finished)
     }
 
     /// The splats that are drawn, on the frame or outside of it, with their numbers.
@@ -268,9 +282,15 @@ impl<'a> Capture<'a> {
     fn write_all<W: Write>(
         &self,
         writer: &mut TraceWriter<W>,
-        fragments: Vec<Vec<Fragment>>,
+        fragments: &[Vec<Fragment>],
     ) -> Result<()> {
-        fragments.iter().flatten().try_for_each(|fragment| self.write(writer, fragment))
+        for fragments in fragments {
+            for run in fragments.chunk_by(|a, b| a.object == b.object) {
+                self.recorded.mark(run[0].object);
+            }
+            writer.push_all(fragments)?;
+        }
+        Ok(())
     }
 
     /// Writes a fragment, and notes that its object has one.
@@ -280,8 +300,8 @@ impl<'a> Capture<'a> {
     }
 
     /// What clipping leaves of a triangle.
-    fn set_up(&self, triangle: &Triangle, shader: &Shader<'_>) -> Vec<ScreenTriangle> {
-        let mut pieces = Vec::new();
+    fn set_up(&self, triangle: &Triangle, shader: &Shader<'_>) -> Pieces {
+        let mut pieces = Pieces::default();
         set_up(triangle, &self.camera, self.keeps_back(triangle, shader), &mut pieces);
         pieces
     }
@@ -314,7 +334,8 @@ impl<'a> Capture<'a> {
             painter,
             placed,
             rules,
-            steps: positions.iter().map(|p| p.map(|v| i64::from(v) * STEPS / 16)).collect(),
+            level: Level::new(),
+            samples: Samples::new(positions),
             pixels: positions.iter().map(|p| p.map(|v| f64::from(v) / 16.0)).collect(),
             size: [self.options.width, self.options.height],
         }

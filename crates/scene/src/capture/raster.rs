@@ -1,41 +1,49 @@
 //! Coverage and depth: fixed-point edge functions by the rules of Direct3D and
 //! Vulkan.
 
+use crate::capture::samples::Samples;
 use crate::capture::setup::{STEPS, ScreenTriangle};
 use screendoor_trace::trace::{DepthPlane, SampleMask, Unorm32};
 
 /// One of a triangle's edges as a function that is not negative where a point
 /// belongs to the triangle: `a·x + b·y + c` in sub-pixel steps.
 #[derive(Clone, Copy, Debug)]
-struct Edge {
-    a: i64,
-    b: i64,
+pub(super) struct Edge {
+    pub a: i64,
+    pub b: i64,
     c: i64,
-    /// Its least and greatest change from a pixel's centre to one of its samples.
-    spread: [i64; 2],
+    /// By how much it is lowered, so that a point on it is outside: 0 or 1.
+    pub lowered: i64,
+    /// What it changes by at least and at most from a pixel's centre to one of its samples.
+    pub spread: [i64; 2],
 }
 
 impl Edge {
-    fn new(from: [i64; 2], to: [i64; 2], offsets: &[[i64; 2]]) -> Self {
+    #[inline(always)]
+    fn new(from: [i64; 2], to: [i64; 2], samples: &Samples) -> Self {
         let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
         let (a, b) = (-dy, dx);
         // A point on the edge belongs to the triangle if the edge is a top or a
         // left one; the others are moved inwards by the least step there is.
         let top_left = dy < 0 || (dy == 0 && dx > 0);
-        let c = dy * from[0] - dx * from[1] - i64::from(!top_left);
-        let change = |o: &[i64; 2]| a * o[0] + b * o[1];
-        let least = offsets.iter().map(change).min().unwrap_or(0);
-        let greatest = offsets.iter().map(change).max().unwrap_or(0);
-        Edge { a, b, c, spread: [least, greatest] }
+        let lowered = i64::from(!top_left);
+        let c = dy * from[0] - dx * from[1] - lowered;
+        // Of the box around the samples: the corner in either direction of the slope.
+        let ends = |slope: i64, [low, high]: [i64; 2]| {
+            if slope < 0 { [slope * high, slope * low] } else { [slope * low, slope * high] }
+        };
+        let (x, y) = (ends(a, samples.reach[0]), ends(b, samples.reach[1]));
+        Edge { a, b, c, lowered, spread: [x[0] + y[0], x[1] + y[1]] }
     }
 
-    fn at(&self, [x, y]: [i64; 2]) -> i64 {
+    #[inline(always)]
+    pub(super) fn at(&self, [x, y]: [i64; 2]) -> i64 {
         self.a * x + self.b * y + self.c
     }
 
     /// Narrows a row's span of pixels to those with a sample that may be inside;
     /// `y` is the row's centre.
-    fn narrow(&self, span: &mut (i64, i64), y: i64) {
+    pub(super) fn narrow(&self, span: &mut (i64, i64), y: i64) {
         // A pixel x has its centre at x·STEPS + STEPS/2; inside means
         // slope·x + rest ≥ 0.
         let slope = self.a * STEPS;
@@ -53,14 +61,44 @@ impl Edge {
 /// A triangle ready to be drawn, row by row.
 #[derive(Clone, Debug)]
 pub(crate) struct Raster<'a> {
-    triangle: &'a ScreenTriangle,
-    offsets: &'a [[i64; 2]],
+    pub(super) triangle: &'a ScreenTriangle,
+    pub(super) samples: &'a Samples,
     /// Edges opposite to corners 0, 1 and 2.
-    edges: [Edge; 3],
+    pub(super) edges: [Edge; 3],
     /// How the depth changes per sub-pixel step to the right and downwards.
-    depth_slopes: [f64; 2],
-    columns: (i64, i64),
+    pub(super) depth_slopes: [f64; 2],
+    pub(super) bounds: Bounds,
+}
+
+/// The pixels that a triangle may touch: the first and the last column and row.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bounds {
+    pub columns: (i64, i64),
     rows: (i64, i64),
+}
+
+impl Bounds {
+    /// Those whose area the triangle's bounding box touches.
+    #[inline(always)]
+    pub(super) fn new(triangle: &ScreenTriangle, size: [u32; 2]) -> Self {
+        let range = |axis: usize, limit: u32| {
+            let [a, b, c] = triangle.corners.map(|p| p[axis]);
+            let low = a.min(b).min(c).div_euclid(STEPS);
+            let high = a.max(b).max(c).div_euclid(STEPS);
+            (low.max(0), high.min(i64::from(limit) - 1))
+        };
+        Bounds { columns: range(0, size[0]), rows: range(1, size[1]) }
+    }
+
+    /// The first and the last row; empty where they cross.
+    pub(super) fn rows(&self) -> (i64, i64) {
+        if self.columns.0 > self.columns.1 { (0, -1) } else { self.rows }
+    }
+
+    /// How many pixels there are within a row.
+    pub(super) fn width(&self) -> i64 {
+        self.columns.1 - self.columns.0 + 1
+    }
 }
 
 /// What a triangle leaves in a pixel, before shading.
@@ -76,46 +114,29 @@ pub(crate) struct Hit {
 }
 
 impl<'a> Raster<'a> {
-    /// `offsets` are the samples' in sub-pixel steps from the pixel's centre.
-    pub(super) fn new(
-        triangle: &'a ScreenTriangle,
-        offsets: &'a [[i64; 2]],
-        size: [u32; 2],
-    ) -> Self {
+    #[inline(always)]
+    pub(super) fn new(triangle: &'a ScreenTriangle, samples: &'a Samples, size: [u32; 2]) -> Self {
         let [p0, p1, p2] = triangle.corners;
-        let edges =
-            [Edge::new(p1, p2, offsets), Edge::new(p2, p0, offsets), Edge::new(p0, p1, offsets)];
-        // The pixels whose area the bounding box touches.
-        let range = |axis: usize, limit: u32| {
-            let all = triangle.corners.map(|p| p[axis]);
-            let low = all.iter().min().expect("three corners").div_euclid(STEPS);
-            let high = all.iter().max().expect("three corners").div_euclid(STEPS);
-            (low.max(0), high.min(i64::from(limit) - 1))
-        };
+        let edge = |from, to| Edge::new(from, to, samples);
         Raster {
             triangle,
-            offsets,
-            edges,
+            samples,
+            edges: [edge(p1, p2), edge(p2, p0), edge(p0, p1)],
             depth_slopes: depth_slopes(triangle),
-            columns: range(0, size[0]),
-            rows: range(1, size[1]),
+            bounds: Bounds::new(triangle, size),
         }
     }
 
     /// The first and the last row that it may touch; empty where they cross.
     pub(super) fn rows(&self) -> (i64, i64) {
-        if self.columns.0 > self.columns.1 { (0, -1) } else { self.rows }
+        self.bounds.rows()
     }
 
-    /// How many pixels its bounding box holds within a row.
-    pub(super) fn columns(&self) -> i64 {
-        self.columns.1 - self.columns.0 + 1
-    }
-
-    /// Finds the pixels of row `y` that have a covered sample, from the left.
+    /// Finds the pixels of row `y` that have a covered sample, from the left. The plain text
+    /// of what [`Scan`](crate::capture::scan::Scan) does in vectors.
     pub(super) fn row(&self, y: i64, mut found: impl FnMut(Hit)) {
         let centre_y = y * STEPS + STEPS / 2;
-        let mut span = self.columns;
+        let mut span = self.bounds.columns;
         for edge in &self.edges {
             edge.narrow(&mut span, centre_y);
         }
@@ -124,11 +145,7 @@ impl<'a> Raster<'a> {
             let values = self.edges.map(|e| e.at(centre));
             let all_inside =
                 self.edges.iter().zip(values).all(|(e, value)| value + e.spread[0] >= 0);
-            let coverage = if all_inside {
-                SampleMask::first(self.offsets.len() as u32)
-            } else {
-                self.coverage(values)
-            };
+            let coverage = if all_inside { self.samples.all() } else { self.coverage(values) };
             if coverage.is_empty() {
                 continue;
             }
@@ -149,7 +166,8 @@ impl<'a> Raster<'a> {
         let shade_at = if values.iter().all(|v| *v >= 0) {
             centre
         } else {
-            self.nearest_sample(centre, coverage)
+            let [x, y] = self.samples.nearest(coverage);
+            [centre[0] + x, centre[1] + y]
         };
         let [x, y] = pixel.map(|v| v as u16);
         Hit { x, y, coverage, depth: self.depth_plane(centre, shade_at), shade_at }
@@ -173,9 +191,10 @@ impl<'a> Raster<'a> {
         edge(0).min(edge(1)).min(edge(2))
     }
 
-    fn coverage(&self, values: [i64; 3]) -> SampleMask {
+    /// The samples of a pixel for whose centre the edges have these values.
+    pub(super) fn coverage(&self, values: [i64; 3]) -> SampleMask {
         let mut mask = 0;
-        for (s, [x, y]) in self.offsets.iter().enumerate() {
+        for (s, [x, y]) in self.samples.offsets.iter().enumerate() {
             let signs = self
                 .edges
                 .iter()
@@ -184,15 +203,6 @@ impl<'a> Raster<'a> {
             mask |= u64::from(signs >= 0) << s;
         }
         SampleMask(mask)
-    }
-
-    fn nearest_sample(&self, centre: [i64; 2], coverage: SampleMask) -> [i64; 2] {
-        let offset = coverage
-            .iter()
-            .map(|s| self.offsets[s])
-            .min_by_key(|[x, y]| x * x + y * y)
-            .unwrap_or([0, 0]);
-        [centre[0] + offset[0], centre[1] + offset[1]]
     }
 
     /// The triangle's depth at a point of its plane, in units of the depth range.
@@ -204,14 +214,20 @@ impl<'a> Raster<'a> {
         self.triangle.depth[0] + per_x * (x - x0) as f64 + per_y * (y - y0) as f64
     }
 
-    /// The depth over the pixel at `centre`, of which the triangle holds `inside`.
-    fn depth_plane(&self, centre: [i64; 2], inside: [i64; 2]) -> DepthPlane {
-        let z = self.depth_at(centre).round();
+    /// The depth's change per pixel to the right and downwards, where it can be recorded.
+    #[inline(always)]
+    pub(super) fn recorded_slopes(&self) -> Option<[i32; 2]> {
         let slopes = self.depth_slopes.map(|slope| (slope * STEPS as f64).round());
-        let fits = (0.0..=f64::from(u32::MAX)).contains(&z)
-            && slopes.iter().all(|s| s.abs() <= f64::from(i32::MAX));
-        if fits {
-            let [dzdx, dzdy] = slopes.map(|s| s as i32);
+        let fits = slopes.iter().all(|s| s.abs() <= f64::from(i32::MAX));
+        fits.then(|| slopes.map(|s| s as i32))
+    }
+
+    /// The depth over the pixel at `centre`, of which the triangle holds `inside`.
+    pub(super) fn depth_plane(&self, centre: [i64; 2], inside: [i64; 2]) -> DepthPlane {
+        let z = self.depth_at(centre).round();
+        if let Some([dzdx, dzdy]) = self.recorded_slopes()
+            && (0.0..=f64::from(u32::MAX)).contains(&z)
+        {
             return DepthPlane { z: Unorm32(z as u32), dzdx, dzdy };
         }
         // A sliver's plane can leave the depth range between a covered sample and
@@ -281,9 +297,8 @@ mod tests {
     use glam::DVec3;
     use screendoor_trace::random::Stream;
 
-    fn offsets(samples: u32) -> Vec<[i64; 2]> {
-        let pattern = pattern(PatternKind::Auto, samples).unwrap();
-        pattern.positions.iter().map(|p| p.map(|v| i64::from(v) * STEPS / 16)).collect()
+    fn samples(count: u32) -> Samples {
+        Samples::new(&pattern(PatternKind::Auto, count).unwrap().positions)
     }
 
     fn triangle(corners: [[i64; 2]; 3], depth: [f64; 3]) -> Option<ScreenTriangle> {
@@ -299,16 +314,16 @@ mod tests {
     }
 
     /// How often each sample of a 16 × 16 frame is covered.
-    fn count(triangles: &[[[i64; 2]; 3]], offsets: &[[i64; 2]]) -> Vec<u32> {
-        let mut counts = vec![0; 256 * offsets.len()];
+    fn count(triangles: &[[[i64; 2]; 3]], samples: &Samples) -> Vec<u32> {
+        let mut counts = vec![0; 256 * samples.offsets.len()];
         for corners in triangles {
             let Some(t) = triangle(*corners, [0.0; 3]) else { continue };
-            let raster = Raster::new(&t, offsets, [16, 16]);
+            let raster = Raster::new(&t, samples, [16, 16]);
             for y in raster.rows().0..=raster.rows().1 {
                 raster.row(y, |hit| {
                     let pixel = usize::from(hit.y) * 16 + usize::from(hit.x);
                     for s in hit.coverage.iter() {
-                        counts[pixel * offsets.len() + s] += 1;
+                        counts[pixel * samples.offsets.len() + s] += 1;
                     }
                 });
             }
@@ -322,7 +337,7 @@ mod tests {
         // often lies on samples, edges and corners.
         let mut random = Stream::new([1]);
         for round in 0..300 {
-            let offsets = offsets(1 << (round % 7));
+            let samples = samples(1 << (round % 7));
             let grain = [1, 16, 128, 256][round % 4];
             let mut step = |low, high| i64::from(random.below((high - low) as u32)) + low;
             let centre = [step(0, 4096) / grain * grain, step(0, 4096) / grain * grain];
@@ -351,7 +366,7 @@ mod tests {
             let fan: Vec<_> = (0..around.len())
                 .map(|i| [centre, around[i], around[(i + 1) % around.len()]])
                 .collect();
-            let counts = count(&fan, &offsets);
+            let counts = count(&fan, &samples);
             assert!(counts.iter().all(|n| *n == 1), "round {round}");
         }
     }
@@ -360,19 +375,21 @@ mod tests {
     fn coverage_is_the_definition_sample_by_sample() {
         let mut random = Stream::new([2]);
         for round in 0..2000 {
-            let offsets = offsets(1 << (round % 7));
+            let samples = samples(1 << (round % 7));
             let grain = [1, 128][round % 2];
             let mut point = || {
                 let mut axis = || i64::from(random.below(6000)) / grain * grain - 1000;
                 [axis(), axis()]
             };
             let corners = [point(), point(), point()];
-            let counts = count(&[corners], &offsets);
+            let counts = count(&[corners], &samples);
             for (i, n) in counts.iter().enumerate() {
-                let (pixel, s) = (i / offsets.len(), i % offsets.len());
+                let (pixel, s) = (i / samples.offsets.len(), i % samples.offsets.len());
                 let (x, y) = ((pixel % 16) as i64, (pixel / 16) as i64);
-                let p =
-                    [x * STEPS + STEPS / 2 + offsets[s][0], y * STEPS + STEPS / 2 + offsets[s][1]];
+                let p = [
+                    x * STEPS + STEPS / 2 + samples.offsets[s][0],
+                    y * STEPS + STEPS / 2 + samples.offsets[s][1],
+                ];
                 assert_eq!(*n, u32::from(inside(corners, p)), "round {round}, {corners:?}, {p:?}");
             }
         }
@@ -395,7 +412,7 @@ mod tests {
 
     #[test]
     fn depth_is_the_plane_through_the_corners() {
-        let offsets = offsets(16);
+        let samples = samples(16);
         let mut random = Stream::new([3]);
         for _ in 0..200 {
             let corners = std::array::from_fn(|_| {
@@ -403,7 +420,7 @@ mod tests {
             });
             let depth = std::array::from_fn(|_| f64::from(random.word() >> 1));
             let Some(t) = triangle(corners, depth).filter(|t| t.area > 1 << 20) else { continue };
-            let raster = Raster::new(&t, &offsets, [16, 16]);
+            let raster = Raster::new(&t, &samples, [16, 16]);
             for y in 0..16 {
                 raster.row(y, |hit| {
                     let centre = [i64::from(hit.x) * STEPS + 128, i64::from(hit.y) * STEPS + 128];
@@ -414,7 +431,7 @@ mod tests {
                         assert!(error.abs() < 1.0, "{error}");
                         // Samples follow the plane to within the slopes' rounding.
                         for s in hit.coverage.iter() {
-                            let o = offsets[s];
+                            let o = samples.offsets[s];
                             let at = raster.weights([centre[0] + o[0], centre[1] + o[1]]).at;
                             let exact: f64 = (0..3).map(|i| at[i] * t.depth[i]).sum();
                             let sixteenths = o.map(|v| (v * 16 / STEPS) as i8);
@@ -429,7 +446,7 @@ mod tests {
 
     #[test]
     fn slivers_stay_within_their_depths() {
-        let offsets = offsets(16);
+        let samples = samples(16);
         let mut random = Stream::new([4]);
         let (mut flat, mut all) = (0, 0);
         for _ in 0..4000 {
@@ -444,7 +461,7 @@ mod tests {
                 (nearest + f64::from(random.below(1 << 26))).min(f64::from(u32::MAX))
             });
             let Some(t) = triangle(corners, depth) else { continue };
-            let raster = Raster::new(&t, &offsets, [16, 16]);
+            let raster = Raster::new(&t, &samples, [16, 16]);
             let range = |pick: fn(f64, f64) -> f64| t.depth.into_iter().reduce(pick).unwrap();
             let (low, high) = (range(f64::min), range(f64::max));
             for y in raster.rows().0..=raster.rows().1 {
@@ -452,7 +469,7 @@ mod tests {
                     all += 1;
                     flat += u32::from((hit.depth.dzdx, hit.depth.dzdy) == (0, 0));
                     for s in hit.coverage.iter() {
-                        let at = hit.depth.at(offsets[s].map(|v| (v * 16 / STEPS) as i8));
+                        let at = hit.depth.at(samples.offsets[s].map(|v| (v * 16 / STEPS) as i8));
                         let at = f64::from(at.0);
                         assert!(at > low - 2.0 && at < high + 2.0, "{at} of {low} to {high}");
                     }

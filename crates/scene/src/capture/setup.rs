@@ -1,5 +1,6 @@
 //! From a triangle in space to triangles on the frame's sub-pixel grid.
 
+use arrayvec::ArrayVec;
 use glam::{DVec3, DVec4};
 
 use crate::capture::camera::Camera;
@@ -10,6 +11,11 @@ pub(crate) const STEPS: i64 = 256;
 /// A clipped corner is kept within this many pixels of the frame's centre, so
 /// that products of coordinates fit into 64 bits with room to spare.
 const GUARD_PIXELS: f64 = (1 << 20) as f64;
+
+/// Corners that a triangle can have once five planes have cut it. Each adds one to a convex
+/// polygon; to one that rounding has bent, at the very most, half as many as there are.
+const MOST_CORNERS: usize = 19;
+type Polygon = ArrayVec<Corner, MOST_CORNERS>;
 
 /// A corner of a clipped triangle.
 #[derive(Clone, Copy, Debug)]
@@ -35,16 +41,43 @@ pub(crate) struct ScreenTriangle {
     pub weights: [DVec3; 3],
 }
 
+/// What clipping leaves of a triangle: mostly one.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Pieces {
+    first: Option<ScreenTriangle>,
+    more: Vec<ScreenTriangle>,
+}
+
+impl Pieces {
+    fn push(&mut self, piece: ScreenTriangle) {
+        match self.first {
+            None => self.first = Some(piece),
+            Some(_) => self.more.push(piece),
+        }
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.first.is_none()
+    }
+
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &ScreenTriangle> {
+        self.first.iter().chain(&self.more)
+    }
+
+    /// Piece `i`.
+    pub(super) fn get(&self, i: usize) -> &ScreenTriangle {
+        match (i, &self.first) {
+            (0, Some(first)) => first,
+            _ => &self.more[i - 1],
+        }
+    }
+}
+
 /// Clips `triangle` against the near plane and the guard band, projects it and
 /// snaps it to the sub-pixel grid; `keep_back` says whether a triangle that shows
 /// its back is drawn. Adds what is left to `out`.
-pub(crate) fn set_up(
-    triangle: &Triangle,
-    camera: &Camera,
-    keep_back: bool,
-    out: &mut Vec<ScreenTriangle>,
-) {
-    let mut polygon: Vec<Corner> = Vec::with_capacity(9);
+pub(crate) fn set_up(triangle: &Triangle, camera: &Camera, keep_back: bool, out: &mut Pieces) {
+    let mut polygon = Polygon::new();
     for (i, vertex) in triangle.vertices.iter().enumerate() {
         let clip = camera.to_clip * vertex.position.extend(1.0);
         polygon.push(Corner { clip, weights: DVec3::from_array(unit(i)) });
@@ -63,7 +96,8 @@ pub(crate) fn set_up(
     if polygon.len() < 3 {
         return;
     }
-    let snapped: Vec<[i64; 2]> = polygon.iter().map(|c| snap(c.clip, camera.size)).collect();
+    let snapped: ArrayVec<[i64; 2], MOST_CORNERS> =
+        polygon.iter().map(|c| snap(c.clip, camera.size)).collect();
     let (apex, whole) = apex(&snapped);
     // Counter-clockwise with y upwards is the front: that is a negative area with
     // y downwards.
@@ -123,11 +157,11 @@ pub(crate) fn cross(a: [i64; 2], b: [i64; 2], c: [i64; 2]) -> i64 {
 ///
 /// A crossing is always computed from its inner end to its outer one, so that two
 /// triangles that share an edge share its crossing to the last bit.
-fn clip(polygon: &mut Vec<Corner>, distance: impl Fn(DVec4) -> f64) {
+fn clip(polygon: &mut Polygon, distance: impl Fn(DVec4) -> f64) {
     if polygon.iter().all(|c| distance(c.clip) >= 0.0) {
         return;
     }
-    let mut kept = Vec::with_capacity(polygon.len() + 1);
+    let mut kept = Polygon::new();
     for (i, a) in polygon.iter().enumerate() {
         let b = &polygon[(i + 1) % polygon.len()];
         let (da, db) = (distance(a.clip), distance(b.clip));

@@ -11,25 +11,27 @@ use screendoor_trace::picture::Space;
 /// Light: a directional one that moves with the camera, a weaker one from the
 /// other side, and a little from everywhere.
 const KEY: Vec3 = Vec3::new(0.45, 0.65, 0.61);
-const KEY_STRENGTH: f32 = 0.75;
+pub(super) const KEY_STRENGTH: f32 = 0.75;
 const FILL: Vec3 = Vec3::new(-0.75, 0.10, 0.65);
-const FILL_STRENGTH: f32 = 0.15;
-const AMBIENT: f32 = 0.10;
+pub(super) const FILL_STRENGTH: f32 = 0.15;
+pub(super) const AMBIENT: f32 = 0.10;
 
 /// What is less opaque than half a step of a 16-bit texture is the tail of a
 /// filter, not a surface: it is not recorded.
 pub(super) const LEAST_ALPHA: f32 = 0.5 / 65535.0;
+/// The greatest colour: beyond half precision there is no need to go.
+pub(super) const MOST_COLOUR: f32 = 65504.0;
 
 /// Shades fragments of a scene.
 pub(crate) struct Shader<'a> {
-    scene: &'a Scene,
-    camera: &'a Camera,
+    pub(super) scene: &'a Scene,
+    pub(super) camera: &'a Camera,
     /// Unit vectors towards the lights, in the scene's space.
-    key: Vec3,
-    fill: Vec3,
-    alpha: Option<f32>,
+    pub(super) key: Vec3,
+    pub(super) fill: Vec3,
+    pub(super) alpha: Option<f32>,
     /// What the trace's colours stand for.
-    space: Space,
+    pub(super) space: Space,
 }
 
 impl<'a> Shader<'a> {
@@ -49,7 +51,7 @@ impl<'a> Shader<'a> {
         Shader { scene, camera, key: turn(KEY), fill: turn(FILL), alpha, space }
     }
 
-    /// Whether the back of a surface of `material` is drawn.
+    /// Material `index`.
     pub(super) fn material(&self, index: usize) -> &Material {
         &self.scene.materials[index]
     }
@@ -91,7 +93,8 @@ impl<'a> Shader<'a> {
 
     /// Colour and alpha of a fragment of `triangle` where its vertices
     /// have these weights; `None` where there is nothing: an alpha of 0 or next to
-    /// it, or cut out by a mask.
+    /// it, or cut out by a mask. The plain text of what [`Batch`](crate::capture::batch::Batch)
+    /// does with several at a time.
     pub(super) fn shade(&self, triangle: &Triangle, weights: &Weights) -> Option<([f32; 3], f32)> {
         let material = self.material(triangle.material);
         let [a, b, c] = &triangle.vertices;
@@ -143,8 +146,8 @@ impl<'a> Shader<'a> {
         }
         let glow = material.emissive_texture.map_or(Vec3::ONE, |t| texel(t).truncate());
         colour += material.emissive * glow;
-        // Negative light is no colour; beyond half precision there is no need to go.
-        let colour = colour.clamp(Vec3::ZERO, Vec3::splat(65504.0)).to_array();
+        // Negative light is no colour.
+        let colour = colour.clamp(Vec3::ZERO, Vec3::splat(MOST_COLOUR)).to_array();
         let colour = match self.space {
             Space::Linear => colour,
             space => colour.map(|c| space.of_linear(f64::from(c)) as f32),

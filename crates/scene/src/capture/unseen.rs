@@ -10,7 +10,7 @@ use serde::Serialize;
 use crate::capture::Capture;
 use crate::capture::geometry::{Geometry, Primitive, Splat, Triangle};
 use crate::capture::job::Tools;
-use crate::capture::setup::set_up;
+use crate::capture::setup::{Pieces, set_up};
 use crate::capture::shade::LEAST_ALPHA;
 use crate::capture::splat::Nothing;
 use crate::scene::{AlphaMode, Material, Shape};
@@ -126,12 +126,12 @@ impl Capture<'_> {
             if [a, b, c].into_iter().all(|p| depth(p) < 0.0) {
                 return Reason::Behind;
             }
-            let mut whole = Vec::new();
+            let mut whole = Pieces::default();
             set_up(triangle, &self.camera, true, &mut whole);
             return if whole.is_empty() { Reason::Thin } else { Reason::Back };
         }
         let mut inside = false;
-        for piece in &pieces {
+        for piece in pieces.iter() {
             let raster = tools.raster(piece);
             let (first, last) = raster.rows();
             for y in first..=last {

@@ -50,6 +50,7 @@ impl Default for Sampling {
 impl Sampling {
     /// The filter within a level, the finer of the levels that are read of 0..=`top`, and
     /// the share of the next one, where a pixel is 2^`size` texels wide.
+    #[inline(always)]
     pub(super) fn choose(&self, size: f32, top: usize) -> (Filter, usize, f32) {
         if size <= 0.0 {
             return (self.magnify, 0, 0.0);
@@ -67,9 +68,92 @@ impl Sampling {
     }
 }
 
+/// The two texels around each of several coordinates, the weights of the second ones, and
+/// whether they are what [`Filter::taps`] says: not where a coordinate is beyond all reason.
+pub(super) struct Taps<const N: usize> {
+    pub low: [u32; N],
+    pub high: [u32; N],
+    pub weight: [f32; N],
+    pub good: bool,
+}
+
+impl<const N: usize> Taps<N> {
+    /// By the linear filter, of textures of `sizes` texels.
+    #[inline(always)]
+    pub(super) fn linear(coordinates: &[f32; N], sizes: &[u32; N], wrap: Wrap) -> Self {
+        match wrap {
+            Wrap::Repeat => Self::with(
+                coordinates,
+                sizes,
+                1,
+                false,
+                #[inline(always)]
+                |i, n| {
+                    let i = if i < 0 { i + n } else { i };
+                    if i >= n { i - n } else { i }
+                },
+            ),
+            Wrap::Clamp => Self::with(
+                coordinates,
+                sizes,
+                1,
+                true,
+                #[inline(always)]
+                |i, n| i.max(0).min(n - 1),
+            ),
+            Wrap::Mirror => Self::with(
+                coordinates,
+                sizes,
+                2,
+                false,
+                #[inline(always)]
+                |i, n| {
+                    let i = if i < 0 { i + 2 * n } else { i };
+                    let i = if i >= 2 * n { i - 2 * n } else { i };
+                    if i < n { i } else { 2 * n - 1 - i }
+                },
+            ),
+        }
+    }
+
+    /// The same with a period of `periods` sizes, of which `place` finds a texel at most a
+    /// period beside the first.
+    #[inline(always)]
+    fn with(
+        coordinates: &[f32; N],
+        sizes: &[u32; N],
+        periods: u32,
+        clamped: bool,
+        place: impl Fn(i32, i32) -> i32,
+    ) -> Self {
+        let mut taps = Taps { low: [0; N], high: [0; N], weight: [0.0; N], good: true };
+        for i in 0..N {
+            let (n, size) = (sizes[i] as i32, sizes[i] as f32);
+            let period = periods as f32 * size;
+            let at = coordinates[i] * size;
+            let at = match clamped {
+                true if at < 0.0 => 0.0,
+                true if at > period => period,
+                true => at,
+                false => at - period * (at / period).floor(),
+            } - 0.5;
+            let low = at.floor();
+            // What is no number is not good either.
+            taps.good &= low >= -1.0 && low < period;
+            taps.weight[i] = at - low;
+            // Between -1 and a period, which 16 bits hold, or not good.
+            let first = low as i32;
+            taps.low[i] = place(first, n) as u32;
+            taps.high[i] = place(first + 1, n) as u32;
+        }
+        taps
+    }
+}
+
 impl Filter {
     /// The two texels around a coordinate of a texture of `size` texels and the weight of the
     /// second.
+    #[inline(always)]
     pub(super) fn taps(self, coordinate: f32, size: u32, wrap: Wrap) -> (u32, u32, f32) {
         let period = match wrap {
             Wrap::Repeat | Wrap::Clamp => size as f32,
@@ -84,6 +168,10 @@ impl Filter {
         }
         let index = |i: f32| {
             let (i, n) = (i as i64, i64::from(size));
+            // Most are within the texture, and a division takes long.
+            if (0..n).contains(&i) {
+                return i as u32;
+            }
             let i = match wrap {
                 Wrap::Repeat => i.rem_euclid(n),
                 Wrap::Clamp => i.clamp(0, n - 1),

@@ -5,9 +5,10 @@ use std::path::Path;
 use glam::{Vec2, Vec4};
 use image::DynamicImage;
 
+use crate::elementary;
 use crate::scene::file;
 use crate::scene::image_file::{self, MAX_SIDE};
-use crate::scene::sampling::{Filter, Sampling, Wrap};
+use crate::scene::sampling::{Filter, Sampling, Taps, Wrap};
 use screendoor_trace::error::Result;
 use screendoor_trace::picture::{Rgba, srgb};
 
@@ -155,6 +156,7 @@ impl Texture {
     /// The texture's linear colour and alpha (not multiplied) at `uv`, filtered as its
     /// sampling says. `dx` and `dy` are the changes of `uv` over one pixel to the right and
     /// downwards.
+    #[inline(always)]
     pub fn sample(&self, uv: Vec2, dx: Vec2, dy: Vec2) -> Vec4 {
         let size = Vec2::new(self.width() as f32, self.height() as f32);
         // The longer of the pixel's two sides in texels: OpenGL 4.6, section 8.14.
@@ -166,10 +168,108 @@ impl Texture {
         if blend > 0.0 && fine < top {
             colour = colour.lerp(self.filtered(filter, fine + 1, uv), blend);
         }
-        let alpha = colour.w;
-        if alpha > 0.0 { (colour.truncate() / alpha).extend(alpha) } else { Vec4::ZERO }
+        divided(colour)
     }
 
+    /// [`Texture::sample`] for the first `count` of several places at once.
+    #[inline(always)]
+    pub(crate) fn sample_each<const N: usize>(
+        &self,
+        uv: &[[f32; N]; 2],
+        dx: &[[f32; N]; 2],
+        dy: &[[f32; N]; 2],
+        count: usize,
+    ) -> [Vec4; N] {
+        let count = count.min(N);
+        let linear = [self.sampling.magnify, self.sampling.minify] == [Filter::Linear; 2];
+        let many = if linear { self.filtered_each(uv, dx, dy, count) } else { None };
+        many.unwrap_or_else(|| {
+            let mut colours = [Vec4::ZERO; N];
+            for (i, colour) in colours[..count].iter_mut().enumerate() {
+                let at = |v: &[[f32; N]; 2]| Vec2::new(v[0][i], v[1][i]);
+                *colour = self.sample(at(uv), at(dx), at(dy));
+            }
+            colours
+        })
+    }
+
+    /// The same where filters are linear; `None` where a number is beyond all reason.
+    #[inline(always)]
+    fn filtered_each<const N: usize>(
+        &self,
+        uv: &[[f32; N]; 2],
+        dx: &[[f32; N]; 2],
+        dy: &[[f32; N]; 2],
+        count: usize,
+    ) -> Option<[Vec4; N]> {
+        let (width, height) = (self.width() as f32, self.height() as f32);
+        let square = |x: f32, y: f32| {
+            let (x, y) = (x * width, y * height);
+            x * x + y * y
+        };
+        let mut sizes = [0.0; N];
+        let mut finite = true;
+        for i in 0..N {
+            let footprint = square(dx[0][i], dx[1][i]).max(square(dy[0][i], dy[1][i]));
+            finite &= i >= count || footprint < f32::INFINITY;
+            let texels = 0.5 * elementary::log2(footprint);
+            sizes[i] = if footprint > 1.0 { texels } else { 0.0 };
+        }
+        if !finite {
+            return None;
+        }
+        let top = self.levels.len() - 1;
+        // The finer level of each place and the share of the next.
+        let (mut fine, mut blends) = ([0; N], [0.0; N]);
+        for i in 0..count {
+            (_, fine[i], blends[i]) = self.sampling.choose(sizes[i], top);
+        }
+        let mut colours = self.level_each(uv, &fine, count)?;
+        let both = |i: usize| blends[i] > 0.0 && fine[i] < top;
+        if (0..count).any(both) {
+            let coarse = fine.map(|level| (level + 1).min(top));
+            let others = self.level_each(uv, &coarse, count)?;
+            for i in (0..count).filter(|i| both(*i)) {
+                colours[i] = colours[i].lerp(others[i], blends[i]);
+            }
+        }
+        for colour in &mut colours[..count] {
+            *colour = divided(*colour);
+        }
+        Some(colours)
+    }
+
+    /// [`Texture::filtered`], linear, of a level for each place.
+    #[inline(always)]
+    fn level_each<const N: usize>(
+        &self,
+        uv: &[[f32; N]; 2],
+        levels: &[usize; N],
+        count: usize,
+    ) -> Option<[Vec4; N]> {
+        let mut sizes = [[1; N]; 2];
+        let mut coordinates = [[0.5; N]; 2];
+        for i in 0..count {
+            let level = &self.levels[levels[i]];
+            (sizes[0][i], sizes[1][i]) = (level.width, level.height);
+            (coordinates[0][i], coordinates[1][i]) = (uv[0][i], uv[1][i]);
+        }
+        let x = Taps::linear(&coordinates[0], &sizes[0], self.sampling.wrap[0]);
+        let y = Taps::linear(&coordinates[1], &sizes[1], self.sampling.wrap[1]);
+        if !(x.good && y.good) {
+            return None;
+        }
+        let mut colours = [Vec4::ZERO; N];
+        for i in 0..count {
+            let level = &self.levels[levels[i]];
+            let row =
+                |y: u32| level.texel(x.low[i], y).lerp(level.texel(x.high[i], y), x.weight[i]);
+            colours[i] = row(y.low[i]).lerp(row(y.high[i]), y.weight[i]);
+        }
+        Some(colours)
+    }
+
+    #[inline(always)]
     fn filtered(&self, filter: Filter, level: usize, uv: Vec2) -> Vec4 {
         let (level, wrap) = (&self.levels[level], self.sampling.wrap);
         let (x0, x1, fx) = filter.taps(uv.x, level.width, wrap[0]);
@@ -183,7 +283,15 @@ impl Texture {
     }
 }
 
+/// A colour that was multiplied by its alpha, not multiplied.
+#[inline(always)]
+fn divided(colour: Vec4) -> Vec4 {
+    let alpha = colour.w;
+    if alpha > 0.0 { (colour.truncate() / alpha).extend(alpha) } else { Vec4::ZERO }
+}
+
 impl Level {
+    #[inline(always)]
     fn texel(&self, x: u32, y: u32) -> Vec4 {
         let [r, g, b, a] = self.texels[(y * self.width + x) as usize].map(f32::from);
         Vec4::new(r, g, b, a) / UNORM16
@@ -218,6 +326,7 @@ impl Level {
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
+    use screendoor_trace::random::Stream;
 
     use super::*;
 
@@ -238,6 +347,45 @@ mod tests {
         assert_eq!(at(4.5, 0.5), 1.0);
         assert_eq!(at(-0.5, 0.5), 0.0);
         assert!((at(0.0, 0.5) - 0.5).abs() < 1e-6);
+    }
+
+    #[test]
+    fn several_texels_are_those_of_each() {
+        let mut random = Stream::new([0x7e4]);
+        let mut real = |scale: f32| (random.word() as f32 / 2.2e9 - 0.98) * scale;
+        for (round, [width, height]) in [[1, 1], [2, 3], [16, 5], [31, 64]].into_iter().enumerate()
+        {
+            let texture = Texture::from_fn(width, height, |x, y| {
+                let value = |k: u32| ((x * 7 + y * 13 + k * 5) % 11) as f32 / 10.0;
+                Vec4::new(value(0), value(1), value(2), value(3))
+            });
+            for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
+                for magnify in [Filter::Linear, Filter::Nearest] {
+                    let sampling = Sampling {
+                        wrap: [wrap, Wrap::Repeat],
+                        magnify,
+                        levels: [Some(Filter::Linear), Some(Filter::Nearest), None][round % 3],
+                        ..Sampling::default()
+                    };
+                    let texture = texture.clone().sampled(sampling);
+                    for i in 0..300 {
+                        // Coordinates that no vector is for now and then.
+                        let reach = [1.0, 3.0, 300.0, 1e12, f32::INFINITY][i % 5];
+                        let mut lanes = |scale| [[0.0_f32; 8]; 2].map(|v| v.map(|_| real(scale)));
+                        let (uv, size) = (lanes(reach), [0.001, 0.1, 2.0, 1e30][i % 4]);
+                        let (dx, dy) = (lanes(size), lanes(size));
+                        let count = i % 9;
+                        let found = texture.sample_each(&uv, &dx, &dy, count);
+                        for (k, found) in found[..count].iter().enumerate() {
+                            let at = |v: &[[f32; 8]; 2]| Vec2::new(v[0][k], v[1][k]);
+                            let wanted = texture.sample(at(&uv), at(&dx), at(&dy));
+                            let bits = |v: Vec4| v.to_array().map(f32::to_bits);
+                            assert_eq!(bits(*found), bits(wanted), "{sampling:?} {uv:?}");
+                        }
+                    }
+                }
+            }
+        }
     }
 
     #[test]

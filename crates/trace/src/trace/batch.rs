@@ -140,6 +140,42 @@ macro_rules! batches {
                 Ok(())
             }
 
+            /// Adds fragments, column by column, where all of them can be kept; tells whether.
+            pub(super) fn extend(&mut self, fragments: &[Fragment]) -> bool {
+                let keeps = true
+                    $(&& <$type as Cells>::keeps(
+                        &self.$name,
+                        fragments.iter().map(|f| f.$($place)+),
+                    ))*
+                    $(&& match &self.$oname {
+                        Some(column) => <$otype as Cells>::keeps(
+                            column,
+                            fragments.iter().map(|f| f.optional.$oname),
+                        ),
+                        None => fragments.iter().all(|f| f.optional.$oname == $default),
+                    })*;
+                if keeps {
+                    $(<$type as Cells>::extend(
+                        &mut self.$name,
+                        fragments.iter().map(|f| f.$($place)+),
+                    );)*
+                    $(if let Some(column) = &mut self.$oname {
+                        let values = fragments.iter().map(|f| f.optional.$oname);
+                        <$otype as Cells>::extend(column, values);
+                    })*
+                    self.len += fragments.len();
+                }
+                keeps
+            }
+
+            /// Builds in the memory of a batch that was taken, where nobody else has it.
+            pub(super) fn reuse(&mut self, batch: Batch) {
+                $(Cells::reuse(batch.$name, &mut self.$name);)*
+                $(if let (Some(column), Some(growing)) = (batch.$oname, &mut self.$oname) {
+                    Cells::reuse(column, growing);
+                })*
+            }
+
             /// The fragments so far as a batch; the builder is empty after.
             pub(super) fn take(&mut self) -> Batch {
                 Batch {

@@ -7,6 +7,7 @@ use std::fmt;
 
 use arrow_buffer::{Buffer, ScalarBuffer};
 use half::f16;
+use half::slice::HalfFloatSliceExt;
 
 use crate::trace::bins::{Binned, BinnedColumn, Copies, Rows, Slabs};
 use crate::trace::column::{Column, Native, Scalar, ValueType};
@@ -48,8 +49,14 @@ pub trait Cells: Sized {
     fn grow(value_type: ValueType, constant: Option<Scalar>) -> Option<Self::Growing>;
     /// Adds a value; tells whether it could be kept.
     fn push(growing: &mut Self::Growing, value: Self::Value) -> bool;
+    /// Whether all of these values could be kept.
+    fn keeps(growing: &Self::Growing, values: impl Iterator<Item = Self::Value>) -> bool;
+    /// Adds values that can all be kept.
+    fn extend(growing: &mut Self::Growing, values: impl Iterator<Item = Self::Value>);
     /// The values so far; the growing column is empty after.
     fn take(growing: &mut Self::Growing) -> Self;
+    /// Gives the memory of a column that was taken back, where nobody else has it.
+    fn reuse(self, growing: &mut Self::Growing);
     /// The column in bins that have no rows yet.
     fn binned(&self) -> Self::Binned;
     /// Copies rows to bins.
@@ -120,14 +127,32 @@ impl<T: Native> Cells for Column<T> {
         }
     }
 
+    #[inline]
+    fn keeps(growing: &Growing<T>, mut values: impl Iterator<Item = T>) -> bool {
+        growing.constant.is_none_or(|constant| values.all(|value| value == constant))
+    }
+
+    #[inline]
+    fn extend(growing: &mut Growing<T>, values: impl Iterator<Item = T>) {
+        if growing.constant.is_none() {
+            growing.values.extend(values);
+        }
+    }
+
     fn take(growing: &mut Growing<T>) -> Self {
         match growing.constant {
             Some(v) => Column::Constant(v),
-            None => {
-                let capacity = growing.values.capacity();
-                let full = std::mem::replace(&mut growing.values, Vec::with_capacity(capacity));
-                Column::Values(full.into())
-            }
+            None => Column::Values(std::mem::take(&mut growing.values).into()),
+        }
+    }
+
+    fn reuse(self, growing: &mut Growing<T>) {
+        if let Column::Values(values) = self
+            && let Ok(mut values) = values.into_inner().into_vec::<T>()
+            && growing.values.is_empty()
+        {
+            values.clear();
+            growing.values = values;
         }
     }
 
@@ -182,6 +207,11 @@ fn aligned<T: Native>(len: usize, bytes: Buffer) -> ScalarBuffer<T> {
 trait Narrow<Wide>: Native {
     fn wide(self) -> Wide;
     fn narrow(value: Wide) -> Self;
+    /// Adds values, narrowed.
+    #[inline]
+    fn append(values: impl Iterator<Item = Wide>, to: &mut Vec<Self>) {
+        to.extend(values.map(Self::narrow));
+    }
 }
 
 macro_rules! masks {
@@ -211,6 +241,24 @@ impl Narrow<f32> for f16 {
     #[inline]
     fn narrow(value: f32) -> Self {
         f16::from_f32(value)
+    }
+    /// Several at a time, for which processors have an instruction.
+    #[inline]
+    fn append(mut values: impl Iterator<Item = f32>, to: &mut Vec<f16>) {
+        let mut wide = [0.0; 64];
+        loop {
+            let mut count = 0;
+            wide.iter_mut().zip(&mut values).for_each(|(wide, value)| {
+                *wide = value;
+                count += 1;
+            });
+            let start = to.len();
+            to.resize(start + count, f16::ZERO);
+            to[start..].convert_from_f32_slice(&wide[..count]);
+            if count < wide.len() {
+                return;
+            }
+        }
     }
 }
 
@@ -320,10 +368,41 @@ macro_rules! either {
                 }
             }
 
+            #[inline]
+            fn keeps(growing: &$growing, values: impl Iterator<Item = $wide>) -> bool {
+                match growing {
+                    $($growing::$variant(column) => {
+                        Column::keeps(column, values.map(<$native>::narrow))
+                    })+
+                    $growing::$last(column) => Column::keeps(column, values),
+                }
+            }
+
+            #[inline]
+            fn extend(growing: &mut $growing, values: impl Iterator<Item = $wide>) {
+                match growing {
+                    $($growing::$variant(column) if column.constant.is_none() => {
+                        <$native>::append(values, &mut column.values);
+                    })+
+                    $($growing::$variant(_) => {})+
+                    $growing::$last(column) => Column::extend(column, values),
+                }
+            }
+
             fn take(growing: &mut $growing) -> Self {
                 match growing {
                     $($growing::$variant(column) => $name::$variant(Column::take(column)),)+
                     $growing::$last(column) => $name::$last(Column::take(column)),
+                }
+            }
+
+            fn reuse(self, growing: &mut $growing) {
+                match (self, growing) {
+                    $(($name::$variant(column), $growing::$variant(growing)) => {
+                        column.reuse(growing);
+                    })+
+                    ($name::$last(column), $growing::$last(growing)) => column.reuse(growing),
+                    _ => {}
                 }
             }
 

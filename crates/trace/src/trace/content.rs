@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use rayon::prelude::*;
+
 use crate::trace::columns::ColumnId;
 use crate::trace::header::without_view;
 use crate::trace::seal::CHECKSUMS;
@@ -38,6 +40,15 @@ impl ContentHasher {
         if let Some((_, hasher)) = self.columns.iter_mut().find(|(id, _)| *id == column) {
             hasher.update(values);
         }
+    }
+
+    /// Adds the next values of all columns, as they are stored, in the file's order. Columns
+    /// are hashed beside each other.
+    pub(super) fn update_all(&mut self, columns: &[(ColumnId, &[u8])]) {
+        assert!(columns.iter().map(|(id, _)| id).eq(self.columns.iter().map(|(id, _)| id)));
+        self.columns.par_iter_mut().zip(columns).for_each(|((_, hasher), (_, values))| {
+            hasher.update(values);
+        });
     }
 
     pub(super) fn finish(mut self, rows: u64) -> String {

@@ -12,6 +12,8 @@ use glam::{DAffine3, DMat2, DMat3, DVec2, DVec3};
 use self::rules::{Alphas, Depth, Distance, Factor};
 pub use self::rules::{PARAMS, RULE_SETS, RuleSet, SplatRules};
 use crate::capture::camera::Camera;
+use crate::capture::lanes::LANES;
+use crate::elementary::{self, LEAST_EXPONENT};
 use crate::scene::Splats;
 use screendoor_trace::picture::Space;
 use screendoor_trace::trace::{DepthPlane, Fragment, SampleMask, Unorm32};
@@ -255,12 +257,14 @@ impl OnFrame {
         self.columns.1 - self.columns.0 + 1
     }
 
+    #[inline(always)]
     fn q(&self, dx: f64, dy: f64) -> f64 {
         let [a, b, c] = self.conic;
         a * dx * dx + 2.0 * b * dx * dy + c * dy * dy
     }
 
-    /// The alpha at an offset from its centre, where it is drawn.
+    /// The alpha at an offset from its centre, where it is drawn. The plain text of
+    /// [`OnFrame::alphas`].
     fn alpha(&self, rules: &SplatRules, dx: f64, dy: f64) -> Option<f32> {
         let q = self.q(dx, dy);
         // Rounding may take it below 0; beyond its reach there may be more of the kernel.
@@ -291,13 +295,15 @@ impl OnFrame {
         (low.max(self.columns.0), high.min(self.columns.1))
     }
 
+    /// The depth at its mean, for everywhere.
+    fn flat_depth(&self) -> DepthPlane {
+        let z = (self.depth.min(1.0) * f64::from(u32::MAX)).round() as u32;
+        DepthPlane { z: Unorm32(z), dzdx: 0, dzdy: 0 }
+    }
+
     fn depth_plane(&self, x: i64, y: i64) -> DepthPlane {
         let range = f64::from(u32::MAX);
-        let flat = DepthPlane {
-            z: Unorm32((self.depth.min(1.0) * range).round() as u32),
-            dzdx: 0,
-            dzdy: 0,
-        };
+        let flat = self.flat_depth();
         if self.slopes == [0.0; 2] {
             return flat;
         }
@@ -312,41 +318,138 @@ impl OnFrame {
         DepthPlane { z: Unorm32(z.round() as u32), dzdx, dzdy }
     }
 
-    /// Its fragments in row `y`, from the left: `found` is told of each as one of splat
-    /// `primitive` of `object`. Samples lie at `offsets` in pixels from the pixel's centre.
+    /// [`OnFrame::alpha`] at several offsets: the alphas, and a bit for each that is drawn.
+    #[inline(always)]
+    fn alphas(
+        &self,
+        rules: &SplatRules,
+        dx: &[f64; LANES],
+        dy: &[f64; LANES],
+    ) -> ([f32; LANES], u64) {
+        let (mut alphas, mut drawn) = ([0.0; LANES], 0);
+        if self.reach > -2.0 * LEAST_EXPONENT {
+            for i in 0..LANES {
+                let alpha = self.alpha(rules, dx[i], dy[i]);
+                alphas[i] = alpha.unwrap_or(0.0);
+                drawn |= u64::from(alpha.is_some()) << i;
+            }
+            return (alphas, drawn);
+        }
+        let mut values = [0.0; LANES];
+        let mut within = [false; LANES];
+        for i in 0..LANES {
+            let q = self.q(dx[i], dy[i]);
+            within[i] = q <= self.reach || q.is_nan();
+            // What is beyond its reach is not used.
+            values[i] = elementary::exp((-q.max(0.0) / 2.0).max(LEAST_EXPONENT));
+        }
+        let (least, cap) = (rules.least(), rules.cap);
+        let values = rules.shares(values);
+        for i in 0..LANES {
+            let alpha = self.opacity * values[i];
+            alphas[i] = alpha.min(cap) as f32;
+            drawn |= u64::from(within[i] & (alpha >= least)) << i;
+        }
+        (alphas, drawn)
+    }
+
+    /// Adds its fragments in row `y`, from the left; each is otherwise like `of`. Samples lie at
+    /// `offsets` in pixels from the pixel's centre.
+    #[inline(always)]
     pub(super) fn row(
         &self,
         y: i64,
         rules: &SplatRules,
         offsets: &[[f64; 2]],
         of: Fragment,
-        mut found: impl FnMut(Fragment),
+        fragments: &mut Vec<Fragment>,
     ) {
+        let of = Fragment { y: y as u16, colour: self.colour, depth: self.flat_depth(), ..of };
+        let deep = self.slopes != [0.0; 2];
+        let depth = |x: i64| if deep { self.depth_plane(x, y) } else { of.depth };
+        let away = |x: i64| DVec2::new(x as f64 + 0.5, y as f64 + 0.5) - self.centre;
         let sampled = rules.alphas == Alphas::Sample;
         let (low, high) = self.span(y, if sampled { 0.5 } else { 0.0 });
-        let all = SampleMask::first(offsets.len() as u32);
-        for x in low..=high {
-            let away = DVec2::new(x as f64 + 0.5, y as f64 + 0.5) - self.centre;
-            let mut tell = |coverage: SampleMask, alpha: f32| {
-                found(Fragment {
-                    x: x as u16,
-                    y: y as u16,
-                    coverage,
-                    depth: self.depth_plane(x, y),
-                    colour: self.colour,
-                    alpha,
-                    ..of
-                });
-            };
-            if !sampled {
-                if let Some(alpha) = self.alpha(rules, away.x, away.y) {
-                    tell(all, alpha);
+        if sampled {
+            for x in low..=high {
+                let (away, depth) = (away(x), depth(x));
+                for (k, group) in offsets.chunks(LANES).enumerate() {
+                    let (mut dx, mut dy) = ([away.x; LANES], [away.y; LANES]);
+                    for (i, offset) in group.iter().enumerate() {
+                        dx[i] += offset[0];
+                        dy[i] += offset[1];
+                    }
+                    let (alphas, drawn) = self.alphas(rules, &dx, &dy);
+                    for i in SampleMask(drawn & (u64::MAX >> (64 - group.len()))).iter() {
+                        let coverage = [k * LANES + i].into_iter().collect();
+                        let (x, alpha) = (x as u16, alphas[i]);
+                        fragments.push(Fragment { x, coverage, depth, alpha, ..of });
+                    }
                 }
-                continue;
             }
-            for (s, [dx, dy]) in offsets.iter().enumerate() {
-                if let Some(alpha) = self.alpha(rules, away.x + dx, away.y + dy) {
-                    tell([s].into_iter().collect(), alpha);
+            return;
+        }
+        let coverage = SampleMask::first(offsets.len() as u32);
+        let mut first = low;
+        while first <= high {
+            let (mut dx, mut dy) = ([0.0; LANES], [0.0; LANES]);
+            for i in 0..LANES {
+                let away = away(first + i as i64);
+                (dx[i], dy[i]) = (away.x, away.y);
+            }
+            let count = (high - first + 1).min(LANES as i64);
+            let (alphas, drawn) = self.alphas(rules, &dx, &dy);
+            for i in SampleMask(drawn & (u64::MAX >> (64 - count))).iter() {
+                let x = first + i as i64;
+                let (depth, alpha) = (depth(x), alphas[i]);
+                fragments.push(Fragment { x: x as u16, coverage, depth, alpha, ..of });
+            }
+            first += count;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::capture::lanes::levels;
+    use fearless_simd::dispatch;
+    use screendoor_trace::random::Stream;
+
+    #[test]
+    fn several_alphas_are_those_of_each() {
+        let mut random = Stream::new([0x5b1a7]);
+        let mut real = |low: f64, high: f64| low + f64::from(random.word()) / 4.3e9 * (high - low);
+        for set in RULE_SETS {
+            let rules = SplatRules::parse(set.name).unwrap();
+            for _ in 0..200 {
+                let (xx, yy) = (real(0.3, 40.0), real(0.3, 40.0));
+                let xy = real(-0.99, 0.99) * (xx * yy).sqrt();
+                let (whole, opacity) = (xx * yy - xy * xy, real(0.01, 1.0));
+                let Some(reach) = rules.reach(opacity) else { continue };
+                let splat = OnFrame {
+                    centre: DVec2::ZERO,
+                    covariance: [xx, xy, yy],
+                    conic: [yy / whole, -xy / whole, xx / whole],
+                    opacity,
+                    colour: [0.5; 3],
+                    distance: 1.0,
+                    // Beyond what vectors are for, too.
+                    reach: if real(0.0, 1.0) < 0.1 { 5000.0 } else { reach },
+                    depth: 0.5,
+                    slopes: [0.0; 2],
+                    columns: (0, 9),
+                    rows: (0, 9),
+                };
+                let far = real(0.1, 60.0);
+                let mut offset = || std::array::from_fn(|_| real(-far, far));
+                let (dx, dy): ([f64; LANES], [f64; LANES]) = (offset(), offset());
+                for level in levels() {
+                    let (alphas, drawn) = dispatch!(level, _ => splat.alphas(&rules, &dx, &dy));
+                    for i in 0..LANES {
+                        let found = (drawn >> i & 1 == 1).then_some(alphas[i]);
+                        assert_eq!(found, splat.alpha(&rules, dx[i], dy[i]), "{}", set.name);
+                    }
                 }
             }
         }

@@ -252,11 +252,23 @@ impl SplatRules {
     /// The share of a splat's opacity at `q`, the square of the distance from its centre in
     /// standard deviations, within its extent.
     pub(super) fn kernel(&self, q: f64) -> f64 {
-        let value = libm::exp(-q / 2.0);
+        let [share] = self.shares([libm::exp(-q / 2.0)]);
+        share
+    }
+
+    /// The same of the Gaussian's values there.
+    #[inline(always)]
+    pub(super) fn shares<const N: usize>(&self, values: [f64; N]) -> [f64; N] {
         match self.kernel {
-            Kernel::Gaussian => value,
-            Kernel::Shifted => (value - self.edge()) / (1.0 - self.edge()),
-            Kernel::Lowered => value - self.edge(),
+            Kernel::Gaussian => values,
+            Kernel::Shifted => {
+                let edge = self.edge();
+                values.map(|value| (value - edge) / (1.0 - edge))
+            }
+            Kernel::Lowered => {
+                let edge = self.edge();
+                values.map(|value| value - edge)
+            }
         }
     }
 
