@@ -16,7 +16,8 @@ pub struct Region {
     pixels: u64,
 }
 
-type TileBits = BitArray<[u64; TILE_PIXELS / 64], Lsb0>;
+/// One bit a pixel of a tile.
+pub(super) type TileBits = BitArray<[u64; TILE_PIXELS / 64], Lsb0>;
 
 impl Region {
     /// The whole frame.
@@ -33,6 +34,20 @@ impl Region {
     /// How many pixels it has.
     pub fn pixels(&self) -> u64 {
         self.pixels
+    }
+
+    /// Which pixels of `tile` it has.
+    pub(super) fn of_tile(&self, tile: TileId) -> TileBits {
+        match &self.bits {
+            Some(bits) => bits.get(tile).copied().unwrap_or_default(),
+            None => {
+                let mut held = TileBits::default();
+                for within in 0..TILE_PIXELS {
+                    held.set(within, self.grid.contains(self.grid.pixel(tile, within)));
+                }
+                held
+            }
+        }
     }
 
     /// Whether it has the pixel at place `within` of `tile`.
