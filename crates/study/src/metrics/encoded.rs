@@ -124,3 +124,39 @@ impl Sums {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use screendoor_trace::random::hash;
+    use screendoor_trace::tile::TileGrid;
+
+    #[test]
+    fn a_region_has_the_same_errors_alone_and_among_others() {
+        let grid = TileGrid::new(40, 24);
+        let unit = |words| f64::from(hash::<3>(words)) / 2_f64.powi(32);
+        let picture = |which: u32| {
+            // Some pixels of the two are equal.
+            Picture::from_fn(grid, |x, y| [unit([if x % 3 == 0 { 0 } else { which }, x, y]); 3])
+        };
+        let (a, b) = (picture(1), picture(2));
+        let small = Region::of_pixels(grid, |x, y| (x + y) % 2 == 0 && x > 20);
+        let regions = [&Region::frame(grid), &small];
+        let encoded = Encoded::of(&b);
+        let together = encoded.errors(&a, &b, &regions);
+        for (found, region) in together.iter().zip(regions) {
+            assert_eq!(*found, encoded.errors(&a, &b, &[region])[0]);
+            assert_eq!(found.pixels, region.pixels());
+        }
+        // As plain sums have it.
+        let (mut square, mut srgb) = (0.0, 0.0);
+        for (x, y) in (0..24).flat_map(|y| (0..40).map(move |x| (x, y))) {
+            let encode = |p: &Picture| p.space().to_encoded(p.get(x, y)[0]);
+            square += (a.get(x, y)[0] - b.get(x, y)[0]).powi(2);
+            srgb += (encode(&a) - encode(&b)).powi(2);
+        }
+        let rmse = |sum: f64| (sum / (24.0 * 40.0)).sqrt() * 255.0;
+        assert!((together[0].rmse - rmse(square)).abs() < 1e-9);
+        assert!((together[0].rmse_srgb - rmse(srgb)).abs() < 1e-9);
+    }
+}

@@ -31,6 +31,19 @@ impl Region {
         Region { grid, bits: Some(bits), pixels }
     }
 
+    /// The pixels for which `has` holds.
+    #[cfg(test)]
+    pub(super) fn of_pixels(grid: TileGrid, has: impl Fn(u32, u32) -> bool) -> Self {
+        let mut bits: TileMap<TileBits> = TileMap::new(grid);
+        for (x, y) in (0..grid.height()).flat_map(|y| (0..grid.width()).map(move |x| (x, y))) {
+            if has(x, y) {
+                let tile = bits.get_or_insert_with(grid.tile(x as u16, y as u16), Default::default);
+                tile.set(TileGrid::within(x as u16, y as u16), true);
+            }
+        }
+        Region::of(grid, bits)
+    }
+
     /// How many pixels it has.
     pub fn pixels(&self) -> u64 {
         self.pixels

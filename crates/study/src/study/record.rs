@@ -223,7 +223,8 @@ pub struct SpectrumOverSeeds {
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Speed {
-    /// Seconds from the file to the picture; `None` where the engine cannot do it.
+    /// Seconds from the file to the picture, with so many [`threads`](Speed::threads); `None`
+    /// where the engine cannot do it.
     pub seconds: Option<Spread>,
     /// Seconds in which a GPU draws, by its own clock.
     pub kernel: Option<Spread>,

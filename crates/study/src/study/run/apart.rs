@@ -16,29 +16,28 @@ use screendoor_trace::error::{Error, Result};
 /// replays keep all cores busy, and the memory of many of them would add up.
 const SHORT: u64 = 1 << 22;
 
-/// How many runs on a subject are done at a time.
-pub(super) fn cores(subject: &Subject, engines: &Engines) -> usize {
+/// How many runs on a subject are done at a time, with a thread each; `None` where they are done
+/// one after the other with all threads. It depends on no more than the subject and the engines,
+/// so that all of a study's runs on it are timed alike, whatever of them was done before.
+pub(super) fn cores(subject: &Subject, engines: &Engines) -> Option<usize> {
     // There is one device, and it is to be timed alone.
     let on_device = engines.iter().any(|(_, engine)| matches!(engine, Ok(Engine::Gpu(..))));
-    match subject.trace.rows() <= SHORT && !on_device {
-        true => rayon::current_num_threads(),
-        false => 1,
-    }
+    (subject.trace.rows() <= SHORT && !on_device).then(rayon::current_num_threads)
 }
 
-/// Calls `each` for every job, in their order: one after the other with all threads, or as many
-/// at a time as there are `cores`, with a thread each. After an error no other job is begun.
+/// Calls `each` for every job, in their order: with all threads, or as many at a time as there
+/// are `cores`, with a thread each. After an error no other job is begun.
 ///
 /// # Errors
 /// The first of `each`; [`Error::Config`] where there are no more threads to be had.
 pub(super) fn each<T: Sync>(
     jobs: &[T],
-    cores: usize,
+    cores: Option<usize>,
     each: impl Fn(&T) -> Result<()> + Sync,
 ) -> Result<()> {
-    if cores < 2 {
+    let Some(cores) = cores.map(|cores| cores.min(jobs.len())) else {
         return jobs.iter().try_for_each(each);
-    }
+    };
     let alone = |_| ThreadPoolBuilder::new().num_threads(1).build();
     let pools = (0..cores).map(alone).collect::<std::result::Result<Vec<ThreadPool>, _>>();
     let pools = pools
@@ -71,7 +70,7 @@ mod tests {
             done.lock().unwrap().push(*job);
             Ok(())
         };
-        each(&jobs, 3, put).unwrap();
+        each(&jobs, Some(3), put).unwrap();
         let mut done = done.into_inner().unwrap();
         done.sort_unstable();
         assert_eq!(done, jobs);
@@ -79,7 +78,7 @@ mod tests {
 
     #[test]
     fn an_error_ends_it() {
-        for cores in [1, 2] {
+        for cores in [None, Some(1), Some(2)] {
             let begun = AtomicUsize::new(0);
             let fails = |job: &usize| {
                 begun.fetch_add(1, Ordering::Relaxed);
@@ -87,7 +86,7 @@ mod tests {
             };
             assert!(each(&(0..1000).collect::<Vec<_>>(), cores, fails).is_err());
             // Two threads may race.
-            assert!(cores > 1 || begun.into_inner() == 1);
+            assert!(cores == Some(2) || begun.into_inner() == 1);
         }
     }
 }

@@ -125,7 +125,7 @@ impl Runner<'_> {
             });
             match (opened, shared) {
                 (Ok(()), Some((scene, reference))) => {
-                    let cores = apart::cores(&scene.subject, &engines).min(jobs.len());
+                    let cores = apart::cores(&scene.subject, &engines);
                     apart::each(jobs, cores, |job| {
                         put(job, guarded(|| self.one(job, &engines, scene, reference, &watch)))
                     })?;
