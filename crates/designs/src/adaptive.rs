@@ -13,8 +13,7 @@
 //! it, over which their transmittance is averaged.
 
 use screendoor_rop::layers::{
-    COVERAGE, Columns, DEPTH_BITS, LAYERS, Layer, composite, contents, insert, nearer, passing,
-    room,
+    COVERAGE, Columns, DEPTH_BITS, LAYERS, Layer, composite, contents, insert, nearer, room,
 };
 use screendoor_rop::{
     Blueprint, Contents, Family, Frame, Info, Layout, OpaquePromise, OrderPromise, OverOpaque,
@@ -156,8 +155,7 @@ impl<const N: usize> Transparent<N> for AdaptiveAt<N> {
             return;
         }
         let nearer = &pixel.nodes[..nearer(&pixel.nodes, fragment.depth.z, probe)];
-        let passes = passing::<N>(nearer);
-        let visible: f64 = coverage.iter().map(|s| passes[s]).sum();
+        let visible: f64 = coverage.iter().map(|s| composite(nearer, s).1).sum();
         let store = self.columns.store;
         for (sum, c) in pixel.colour.iter_mut().zip(fragment.colour) {
             *sum = store.channel(*sum + c * alpha * visible as f32);
