@@ -157,8 +157,10 @@ impl Measurements {
             for design in designs {
                 tell(&format!("{} at {samples}", design.label()));
                 let mut run = measure(&subject, &reference, design, &setup)?;
-                let seconds = Spread::of(&run.seconds);
-                run.record.speed.insert("fast".to_string(), Speed { seconds, ..Speed::default() });
+                let seconds = Spread::of(&run.timed.seconds);
+                let threads = Some(rayon::current_num_threads() as u32);
+                let speed = Speed { seconds, threads, ..Speed::default() };
+                run.record.speed.insert("fast".to_string(), speed);
                 measured.runs.push(run);
             }
             measured.references.push(reference.picture);

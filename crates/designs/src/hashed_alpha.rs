@@ -132,11 +132,19 @@ const PLACES: f64 = 32.0;
 const MOVED: f64 = 0.013;
 
 impl HashedThreshold {
-    /// What alpha is compared with, 0 to 1, for `sample` of a fragment.
-    fn threshold(&self, seed: u32, site: Site, fragment: &Fragment, sample: u32) -> f64 {
+    /// What alpha is compared with, 0 to 1, for `sample` of a fragment; `cells` are the
+    /// fragment's where the noise is of its place.
+    fn threshold(
+        &self,
+        seed: u32,
+        site: Site,
+        fragment: &Fragment,
+        cells: Option<&Cells>,
+        sample: u32,
+    ) -> f64 {
         let (x, y, primitive) = (u32::from(site.x), u32::from(site.y), fragment.primitive);
         let uniform = match self.noise {
-            Noise::Place => self.at_place(seed, site, fragment, sample),
+            Noise::Place => cells.expect("it has cells").threshold(seed, fragment.object, sample),
             Noise::Primitive => fraction(hash([seed, x, y, sample, primitive])),
             Noise::StochasticSplats => {
                 let packed = x ^ y << 20 ^ sample << 8;
@@ -170,8 +178,8 @@ impl HashedThreshold {
         if self.power == 1.0 { uniform } else { libm::pow(uniform, self.power) }
     }
 
-    /// The published threshold in (0, 1] of a fragment, from `sample` on where each has its own.
-    fn at_place(&self, seed: u32, site: Site, fragment: &Fragment, sample: u32) -> f64 {
+    /// The cells of the published threshold that a fragment lies in: all its samples share them.
+    fn cells(&self, site: Site, fragment: &Fragment) -> Cells {
         let depth = |unorm: f64| unorm * self.depth_in_pixels;
         let place = [
             f64::from(site.x) + 0.5,
@@ -187,14 +195,28 @@ impl HashedThreshold {
         // The two powers of two beside the pixel's scale, and how near it is to the
         // upper one.
         let log = libm::log2(1.0 / (self.scale * step));
-        let between = log - log.floor();
         let cell = |exponent: f64| {
             let scale = libm::exp2(exponent);
             let [x, y, z] = place.map(|p| (p * scale).floor() as i64 as u32);
-            let word = hash([seed, fragment.object, x, y, z, sample, exponent as i32 as u32]);
-            fraction(word)
+            [x, y, z, exponent as i32 as u32]
         };
-        let (lower, upper) = (cell(log.floor()), cell(log.ceil()));
+        Cells { between: log - log.floor(), cells: [cell(log.floor()), cell(log.ceil())] }
+    }
+}
+
+/// Cells of two sizes, the smaller exponent first, and how near the pixel's is to the upper.
+struct Cells {
+    between: f64,
+    cells: [[u32; 4]; 2],
+}
+
+impl Cells {
+    /// The published threshold in (0, 1] of a fragment, from `sample` on where each has its own.
+    fn threshold(&self, seed: u32, object: u32, sample: u32) -> f64 {
+        let value = |[x, y, z, exponent]: [u32; 4]| {
+            fraction(hash([seed, object, x, y, z, sample, exponent]))
+        };
+        let ([lower, upper], between) = (self.cells.map(value), self.between);
         uniform((1.0 - between) * lower + between * upper, between.min(1.0 - between))
     }
 }
@@ -259,6 +281,8 @@ impl<const N: usize> Sampler<N> for HashedThreshold {
         probe: &mut P,
     ) -> SampleMask {
         let opacity = Threshold::of(fragment.alpha);
+        let in_cells = self.noise == Noise::Place && !passed.is_empty();
+        let cells = in_cells.then(|| self.cells(site, fragment));
         let passes = |sample: u32, probe: &mut P| {
             // Of a place two, one for each scale; nvpro's is a hash of a hash of a hash; a mask is
             // looked up.
@@ -268,7 +292,7 @@ impl<const N: usize> Sampler<N> for HashedThreshold {
                 Noise::Primitive | Noise::StochasticSplats | Noise::Spark => 1,
                 Noise::Mask => 0,
             });
-            let threshold = self.threshold(round.seed, site, fragment, sample);
+            let threshold = self.threshold(round.seed, site, fragment, cells.as_ref(), sample);
             let x = (threshold * 2_f64.powi(32)) as u32;
             probe.reference(sample as u8, sample, x, opacity);
             opacity.passes(x)
@@ -323,7 +347,8 @@ mod tests {
             let of = threshold(noise, power);
             let fragment = Fragment { primitive: 7, ..Fragment::default() };
             for alpha in [0.1, 0.3, 0.5] {
-                let passed = (0..4096).filter(|i| of.threshold(3, site(*i), &fragment, 0) < alpha);
+                let passed =
+                    (0..4096).filter(|i| of.threshold(3, site(*i), &fragment, None, 0) < alpha);
                 let share = passed.count() as f64 / 4096.0;
                 // A mask holds each rank once; of white noise σ is 0.008 at most, and the bound six of them.
                 let bound = if noise == Noise::Mask { 3e-4 } else { 0.048 };
@@ -347,6 +372,7 @@ mod tests {
                 9,
                 Site { x, y: 5 },
                 &fragment,
+                None,
                 sample,
             )
         };
@@ -361,7 +387,7 @@ mod tests {
         let of = threshold(Noise::Mask, 1.0);
         let row = |primitive: u32| -> Vec<u64> {
             let fragment = Fragment { primitive, ..Fragment::default() };
-            let at = |x| of.threshold(1, Site { x, y: 0 }, &fragment, 0).to_bits();
+            let at = |x| of.threshold(1, Site { x, y: 0 }, &fragment, None, 0).to_bits();
             (0..64).map(at).collect()
         };
         let rows: Vec<Vec<u64>> = (0..1000).map(row).collect();

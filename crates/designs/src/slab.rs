@@ -35,7 +35,7 @@
 
 use screendoor_rop::layers::{
     self, COVERAGE, Columns, Coverage, DEPTH_BITS, Deep, LAYERS, Layer, composite, contents,
-    nearer, room,
+    nearer, passing, room,
 };
 use screendoor_rop::shader;
 use screendoor_rop::{
@@ -249,6 +249,15 @@ impl<const N: usize> SlabAt<N> {
         (colour, share(free))
     }
 
+    /// How much passes layers in each column.
+    fn passes(&self, layers: &[SlabLayer]) -> [f64; N] {
+        if self.opacity == Opacity::Continuous {
+            return passing(layers.iter().map(|l| &l.layer));
+        }
+        let share = |column| f64::from(self.free(layers, column).count()) / f64::from(self.bits);
+        std::array::from_fn(share)
+    }
+
     /// The probability with which a fragment of this alpha enters behind layers that
     /// leave `passes`: `P_b`, linear between whole numbers of bits, which is its mean
     /// over `s = ⌊(1 − passes)·b + ξ⌋` and `t = ⌊α·b + ξ'⌋`.
@@ -321,7 +330,8 @@ impl<const N: usize> SlabAt<N> {
         if self.bits == 0 {
             return Some(whole);
         }
-        let most = coverage.iter().map(|s| self.through(before, s).1).fold(0.0, f64::max);
+        let passes = self.passes(before);
+        let most = coverage.iter().map(|s| passes[s]).fold(0.0, f64::max);
         let p = self.probability(most, alpha.into());
         probe.hashed(1);
         if !Threshold::of(p as f32).passes(word(0)) {
@@ -411,7 +421,8 @@ impl<const N: usize> Transparent<N> for SlabAt<N> {
         let visible = if self.normalise.by_depth() {
             let place = nearer(&pixel.layers, fragment.depth.z, probe);
             probe.state((self.layer_bits() - DEPTH_BITS) * pixel.layers.len() as u32, 0);
-            coverage.iter().map(|s| self.through(&pixel.layers[..place], s).1).sum()
+            let passes = self.passes(&pixel.layers[..place]);
+            coverage.iter().map(|s| passes[s]).sum()
         } else {
             0.0
         };
@@ -420,7 +431,7 @@ impl<const N: usize> Transparent<N> for SlabAt<N> {
         let colour = fragment.colour;
         pixel.sums.add(self.normalise, store, columns, coverage, colour, alpha, visible);
         probe.written(fragment.coverage);
-        let bits = self.normalise.layout(coverage.count(), store).bits().total();
+        let bits = self.normalise.bits(coverage.count(), store);
         probe.state(bits, bits);
     }
 

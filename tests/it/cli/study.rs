@@ -132,6 +132,8 @@ fn an_interrupted_study_with_times_differs_in_times_alone() {
     for record in a.iter_mut().chain(&mut b) {
         let fast = &record.speed["fast"];
         assert!(fast.seconds.unwrap().median > 0.0 && fast.same_bits == Some(true));
+        // Short replays have a thread each.
+        assert_eq!(fast.threads, Some(1));
         record.speed.clear();
     }
     assert_eq!(a, b);

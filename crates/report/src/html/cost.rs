@@ -20,7 +20,8 @@ pub(super) fn section(content: &Content<'_>) -> Markup {
             @for (engine, class) in engines.iter().zip(CLASSES) {
                 (swatch(class)) " " code { (engine) } " "
             }
-            "This is how fast this program replays on this machine. It says nothing of a ROP in hardware."
+            (threads(content)) " This is how fast this program replays on this machine. It says \
+             nothing of a ROP in hardware."
         }, &throughput(content, &engines))) }
         h3 { "What a ROP does for each fragment, at " (count) " samples" }
         (figure("counts", &content.by_scene(|scene| counts(content, scene)), &html! {
@@ -38,6 +39,27 @@ pub(super) fn section(content: &Content<'_>) -> Markup {
 
 const CLASSES: [&str; 3] = ["a", "b", "c"];
 
+/// The threads that each replay had which was timed, where they had as many.
+fn threads_of_each(content: &Content<'_>) -> Option<u32> {
+    let records = content.results.records.iter();
+    let mut timed = records.flat_map(|r| r.speed.values()).filter(|s| s.seconds.is_some());
+    let first = timed.next()?.threads?;
+    timed.all(|s| s.threads == Some(first)).then_some(first)
+}
+
+/// What the replays had of the machine.
+fn threads(content: &Content<'_>) -> String {
+    match threads_of_each(content) {
+        Some(1) => {
+            "A replay had one thread: other runs kept the machine's other cores busy, where \
+                    it has more."
+                .to_string()
+        }
+        Some(threads) => format!("A replay had {threads} threads."),
+        None => String::new(),
+    }
+}
+
 /// The command that times all designs on the first scene.
 fn throughput(content: &Content<'_>, engines: &[String]) -> Markup {
     let study = &content.results.study;
@@ -47,8 +69,11 @@ fn throughput(content: &Content<'_>, engines: &[String]) -> Markup {
     if designs.is_empty() || engines.is_empty() || study.timing == 0 {
         return content.study_command();
     }
+    let threads =
+        threads_of_each(content).filter(|n| *n as usize != content.results.machine.threads);
+    let threads = threads.map(|n| format!(" --threads {n}")).unwrap_or_default();
     command(&format!(
-        "screendoor throughput {} --designs {} --samples {} --engines {} --runs {}",
+        "screendoor{threads} throughput {} --designs {} --samples {} --engines {} --runs {}",
         quoted(&scene.trace),
         quoted(&designs.join(",")),
         content.count,

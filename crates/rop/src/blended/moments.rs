@@ -95,9 +95,19 @@ impl Moments {
 /// The share of a measure with the normalised moments `b` (b_0 = 1; 4, 6 or 8 more)
 /// that lies before `z`, and the share `overestimation` of what may lie at `z`.
 fn share_before(b: &[f64], z: f64, overestimation: f64) -> f64 {
-    let hankel = Hankel::factor(b);
+    match b.len() {
+        5 => share_of_degree::<2>(b, z, overestimation),
+        7 => share_of_degree::<3>(b, z, overestimation),
+        _ => share_of_degree::<4>(b, z, overestimation),
+    }
+}
+
+/// The same where K is of degree `D`, which is known beforehand, so that loops over its
+/// coefficients are none.
+fn share_of_degree<const D: usize>(b: &[f64], z: f64, overestimation: f64) -> f64 {
+    let hankel = Hankel::<D>::factor(b);
     let (kernel, at_z) = hankel.kernel(z);
-    let before: f64 = roots(&kernel, -REACH, z).iter().map(|x| hankel.mass(*x)).sum();
+    let before: f64 = roots::<D>(&kernel, -REACH, z).iter().map(|x| hankel.mass(*x)).sum();
     let share = before + overestimation * at_z;
     // Numbers beyond all range, from moments that no measure has, say nothing.
     if share.is_finite() { share.clamp(0.0, 1.0) } else { overestimation }
@@ -106,12 +116,12 @@ fn share_before(b: &[f64], z: f64, overestimation: f64) -> f64 {
 /// Mass that lies further out than this is below REACH^-2n.
 const REACH: f64 = 100.0;
 
-/// A coefficient for each power up to the degree.
-type Polynomial = ArrayVec<f64, { DEGREE + 1 }>;
+/// A coefficient for each power up to the degree, and nothing beyond.
+type Polynomial = [f64; DEGREE + 1];
 
 /// The Hankel matrix as L D Lᵀ, L with a unit diagonal.
-struct Hankel {
-    l: [[f64; DEGREE + 1]; DEGREE + 1],
+struct Hankel<const D: usize> {
+    l: [Polynomial; DEGREE + 1],
     d: Polynomial,
 }
 
@@ -119,17 +129,17 @@ struct Hankel {
 /// of it. With this in its place the kernel's roots are those points still.
 const LEAST_PIVOT: f64 = 1e-12;
 
-impl Hankel {
+impl<const D: usize> Hankel<D> {
+    #[inline]
     fn factor(b: &[f64]) -> Self {
-        let n = (b.len() - 1) / 2;
-        let mut hankel = Hankel { l: [[0.0; DEGREE + 1]; DEGREE + 1], d: Polynomial::new() };
-        for j in 0..=n {
-            for i in j..=n {
+        let mut hankel = Hankel { l: [[0.0; DEGREE + 1]; DEGREE + 1], d: [0.0; DEGREE + 1] };
+        for j in 0..=D {
+            for i in j..=D {
                 let known: f64 =
                     (0..j).map(|k| hankel.l[i][k] * hankel.l[j][k] * hankel.d[k]).sum();
                 let rest = b[i + j] - known;
                 if i == j {
-                    hankel.d.push(rest.max(LEAST_PIVOT));
+                    hankel.d[j] = rest.max(LEAST_PIVOT);
                 }
                 hankel.l[i][j] = if i == j { 1.0 } else { rest / hankel.d[j] };
             }
@@ -138,71 +148,99 @@ impl Hankel {
     }
 
     /// L⁻¹ v(x): the orthogonal polynomials at x.
+    #[inline]
     fn orthogonal(&self, x: f64) -> Polynomial {
-        let mut y = Polynomial::new();
+        let mut y = [0.0; DEGREE + 1];
         let mut power = 1.0;
-        for row in &self.l[..self.d.len()] {
-            y.push(power - y.iter().zip(row).map(|(y, l)| y * l).sum::<f64>());
+        for i in 0..=D {
+            y[i] = power - (0..i).map(|k| y[k] * self.l[i][k]).sum::<f64>();
             power *= x;
         }
         y
     }
 
     /// 1 / v(x)ᵀ B⁻¹ v(x): the most mass that can lie at x.
+    #[inline]
     fn mass(&self, x: f64) -> f64 {
-        1.0 / self.orthogonal(x).iter().zip(&self.d).map(|(y, d)| y * y / d).sum::<f64>()
+        let y = self.orthogonal(x);
+        1.0 / (0..=D).map(|i| y[i] * y[i] / self.d[i]).sum::<f64>()
     }
 
     /// The coefficients of K for `z`, and the most mass that can lie there.
+    #[inline]
     fn kernel(&self, z: f64) -> (Polynomial, f64) {
         let y = self.orthogonal(z);
-        let mut q: Polynomial = y.iter().zip(&self.d).map(|(y, d)| y / d).collect();
-        let inverse: f64 = y.iter().zip(&q).map(|(y, q)| y * q).sum();
-        for i in (0..q.len()).rev() {
-            q[i] -= (i + 1..q.len()).map(|k| self.l[k][i] * q[k]).sum::<f64>();
+        let mut q = [0.0; DEGREE + 1];
+        for i in 0..=D {
+            q[i] = y[i] / self.d[i];
+        }
+        let inverse: f64 = (0..=D).map(|i| y[i] * q[i]).sum();
+        for i in (0..=D).rev() {
+            q[i] -= (i + 1..=D).map(|k| self.l[k][i] * q[k]).sum::<f64>();
         }
         (q, 1.0 / inverse)
     }
 }
 
-/// The roots of a polynomial, all of whose roots are real, between `low` and `high`:
-/// between two neighbouring roots of its derivative there is one or none.
-fn roots(p: &[f64], low: f64, high: f64) -> ArrayVec<f64, DEGREE> {
-    if p.len() <= 1 {
-        return ArrayVec::new();
+/// The roots of a polynomial of degree `D`, all of whose roots are real, between `low` and
+/// `high`: between two neighbouring roots of its derivative there is one or none.
+#[inline]
+fn roots<const D: usize>(p: &Polynomial, low: f64, high: f64) -> ArrayVec<f64, DEGREE> {
+    // The polynomial and its derivatives, down to a constant.
+    let mut chain = [*p; DEGREE + 1];
+    for k in 1..=D {
+        for i in 0..=D - k {
+            chain[k][i] = (i + 1) as f64 * chain[k - 1][i + 1];
+        }
     }
-    let derivative: Polynomial = p.iter().enumerate().skip(1).map(|(k, c)| k as f64 * c).collect();
-    let turns = roots(&derivative, low, high);
-    let ends = turns.iter().copied().chain([high]);
-    let mut found = ArrayVec::new();
-    let mut start = low;
-    for end in ends {
-        found.extend(root_between(p, &derivative, start, end));
-        start = end;
+    let mut turns = ArrayVec::<f64, DEGREE>::new();
+    for k in (0..D).rev() {
+        let (p, derivative) = (&chain[k], &chain[k + 1]);
+        let mut found = ArrayVec::new();
+        let mut start = low;
+        for end in turns.iter().copied().chain([high]) {
+            found.extend(match D - k {
+                1 => root_between::<1>(p, derivative, start, end),
+                2 => root_between::<2>(p, derivative, start, end),
+                3 => root_between::<3>(p, derivative, start, end),
+                _ => root_between::<4>(p, derivative, start, end),
+            });
+            start = end;
+        }
+        turns = found;
     }
-    found
+    turns
 }
 
-fn evaluate(p: &[f64], x: f64) -> f64 {
-    p.iter().rev().fold(0.0, |sum, c| sum * x + c)
+/// The value at `x` of a polynomial of degree `D`.
+#[inline]
+fn evaluate<const D: usize>(p: &Polynomial, x: f64) -> f64 {
+    (0..D).rev().fold(p[D], |sum, i| sum * x + p[i])
 }
 
-/// The root of `p` between two points between which it is monotone, if it has one
-/// there: Newton's method within an interval that shrinks.
-fn root_between(p: &[f64], derivative: &[f64], mut low: f64, mut high: f64) -> Option<f64> {
-    let rises = evaluate(p, high) > 0.0;
-    if (evaluate(p, low) > 0.0) == rises {
+/// The root of `p`, of degree `D`, between two points between which it is monotone, if it has
+/// one there: Newton's method within an interval that shrinks.
+#[inline]
+fn root_between<const D: usize>(
+    p: &Polynomial,
+    derivative: &Polynomial,
+    mut low: f64,
+    mut high: f64,
+) -> Option<f64> {
+    let slope = |x: f64| (0..D - 1).rev().fold(derivative[D - 1], |sum, i| sum * x + derivative[i]);
+    let rises = evaluate::<D>(p, high) > 0.0;
+    if (evaluate::<D>(p, low) > 0.0) == rises {
         return None;
     }
     let mut x = 0.5 * (low + high);
     for _ in 0..80 {
-        let value = evaluate(p, x);
+        let value = evaluate::<D>(p, x);
         if (value > 0.0) == rises {
             high = x;
         } else {
             low = x;
         }
-        let newton = x - value / evaluate(derivative, x);
+        let newton = x - value / slope(x);
         let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
         if (next - x).abs() <= 1e-14 * (1.0 + x.abs()) {
             break;
@@ -322,13 +360,13 @@ mod tests {
     #[test]
     fn roots_are_found_wherever_they_lie() {
         // (x + 90)(x + 1)(x − 0.25)(x − 0.5), and the same without the first.
-        let cubic = [0.125, -0.625, 0.25, 1.0];
+        let cubic = [0.125, -0.625, 0.25, 1.0, 0.0];
         let quartic = [11.25, -56.125, 21.875, 90.25, 1.0];
-        for (p, expected) in [(&quartic[..], &[-90.0, -1.0, 0.25][..]), (&cubic, &[-1.0, 0.25])] {
-            let found = roots(p, -REACH, 0.4);
+        let found = [roots::<4>(&quartic, -REACH, 0.4), roots::<3>(&cubic, -REACH, 0.4)];
+        for (found, expected) in found.into_iter().zip([&[-90.0, -1.0, 0.25][..], &[-1.0, 0.25]]) {
             assert_eq!(found.len(), expected.len());
             assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9), "{found:?}");
         }
-        assert_eq!(roots(&[0.0, 0.0, 0.0], -1.0, 1.0).len(), 0);
+        assert_eq!(roots::<2>(&[0.0; 5], -1.0, 1.0).len(), 0);
     }
 }

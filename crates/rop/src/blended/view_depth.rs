@@ -46,12 +46,14 @@ pub struct ViewDepth {
     near: f64,
     range: f64,
     projection: Projection,
+    /// The logarithm of the far plane's view depth, where the near one's is 1.
+    log_far: f64,
 }
 
 impl ViewDepth {
     /// From a near plane at view depth `near` > 0 over a `range` > 0.
     pub fn new(near: f64, range: f64, projection: Projection) -> Self {
-        ViewDepth { near, range, projection }
+        ViewDepth { near, range, projection, log_far: libm::log1p(range / near) }
     }
 
     /// As the parameters say, for a trace of `frame`.
@@ -107,8 +109,8 @@ impl ViewDepth {
     /// The logarithm of the view depth of `z`, −1 at the near plane and 1 at the far.
     #[inline]
     pub fn log_warped(&self, z: Unorm32) -> f64 {
-        let log = |beyond: f64| libm::log1p(beyond / self.near);
-        2.0 * (log(self.beyond_near(z)) / log(self.range)).clamp(0.0, 1.0) - 1.0
+        let log = libm::log1p(self.beyond_near(z) / self.near);
+        2.0 * (log / self.log_far).clamp(0.0, 1.0) - 1.0
     }
 
     /// How far `z` lies beyond the near plane.

@@ -344,6 +344,20 @@ pub fn composite<'a>(
     (colour, transmittance)
 }
 
+/// How much passes layers, near to far, in each column: the second of [`composite`] for all of
+/// them at once. A column that a layer does not cover is multiplied by 1, which changes no bit.
+#[inline]
+pub fn passing<'a, const N: usize>(layers: impl IntoIterator<Item = &'a Layer>) -> [f64; N] {
+    let mut passing = [1.0; N];
+    for layer in layers {
+        let transmittance = f64::from(layer.transmittance);
+        for (column, passes) in passing.iter_mut().enumerate() {
+            *passes *= if layer.coverage.contains(column) { transmittance } else { 1.0 };
+        }
+    }
+    passing
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -32,11 +32,24 @@ impl Normalise {
     /// What [`VisibilitySums`] hold over so many columns: a transmittance each, and one sum of
     /// colours, with one of alphas where these are scaled.
     pub fn layout(self, columns: u32, store: ColourStore) -> Layout {
-        let columns = if self.by_alpha() { columns } else { 0 };
-        let colour = if self.by_depth() { store.colour_bits() } else { 0 };
-        let alpha = if self == Normalise::Both { store.channel_bits() } else { 0 };
+        let [columns, colour, alpha] = self.parts(columns, store);
         Layout::of(columns, &[(store.channel_bits(), "transmittance")])
             .and(1, &[(colour, "summed colour"), (alpha, "summed alpha")])
+    }
+
+    /// The bits of that layout, which fragments ask for: a sum, and no list.
+    pub fn bits(self, columns: u32, store: ColourStore) -> u32 {
+        let [columns, colour, alpha] = self.parts(columns, store);
+        columns * store.channel_bits() + colour + alpha
+    }
+
+    /// Columns with a transmittance, and the bits of the sums of colours and of alphas.
+    fn parts(self, columns: u32, store: ColourStore) -> [u32; 3] {
+        [
+            if self.by_alpha() { columns } else { 0 },
+            if self.by_depth() { store.colour_bits() } else { 0 },
+            if self == Normalise::Both { store.channel_bits() } else { 0 },
+        ]
     }
 }
 

@@ -1,10 +1,12 @@
 //! Errors over several seeds, variance and bias apart.
 
+use std::borrow::Cow;
+
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::metrics::temporal::Deviations;
-use crate::metrics::{Errors, Estimate, ROUNDING, Region, Temporal, UNIT, errors};
+use crate::metrics::{Encoded, Errors, Estimate, ROUNDING, Region, Temporal, UNIT};
 use screendoor_trace::picture::{Picture, TilePixels};
 use screendoor_trace::tile::{TILE_PIXELS, TileMap};
 
@@ -20,6 +22,7 @@ const RARE: f64 = 20.7;
 #[derive(Debug)]
 pub struct Ensemble<'a> {
     reference: &'a Picture,
+    encoded: Cow<'a, Encoded>,
     regions: Vec<&'a Region>,
     /// One row a region, one entry a run.
     runs: Vec<Vec<Errors>>,
@@ -67,8 +70,18 @@ pub struct EnsembleErrors {
 impl<'a> Ensemble<'a> {
     /// An ensemble without runs.
     pub fn new(reference: &'a Picture, regions: &[&'a Region]) -> Self {
+        Self::begin(reference, Cow::Owned(Encoded::of(reference)), regions)
+    }
+
+    /// The same against a reference that was encoded before.
+    pub fn against(reference: &'a Picture, encoded: &'a Encoded, regions: &[&'a Region]) -> Self {
+        Self::begin(reference, Cow::Borrowed(encoded), regions)
+    }
+
+    fn begin(reference: &'a Picture, encoded: Cow<'a, Encoded>, regions: &[&'a Region]) -> Self {
         Ensemble {
             reference,
+            encoded,
             regions: regions.to_vec(),
             runs: vec![Vec::new(); regions.len()],
             sums: TileMap::new(reference.grid()),
@@ -83,8 +96,25 @@ impl<'a> Ensemble<'a> {
     /// # Panics
     /// Where its frame differs from the reference's.
     pub fn add(&mut self, picture: &Picture) {
-        let of_region = |region: &&Region| errors(picture, self.reference, region);
-        let found: Vec<Errors> = self.regions.par_iter().map(of_region).collect();
+        let found = self.errors(picture);
+        self.put(picture, found);
+    }
+
+    /// Adds those of several, in their order; looks at them side by side.
+    ///
+    /// # Panics
+    /// As [`Ensemble::add`].
+    pub fn add_all(&mut self, pictures: &[Picture]) {
+        let found: Vec<Vec<Errors>> = pictures.par_iter().map(|p| self.errors(p)).collect();
+        pictures.iter().zip(found).for_each(|(picture, found)| self.put(picture, found));
+    }
+
+    fn errors(&self, picture: &Picture) -> Vec<Errors> {
+        self.encoded.errors(picture, self.reference, &self.regions)
+    }
+
+    fn put(&mut self, picture: &Picture, found: Vec<Errors>) {
+        let reference = self.reference;
         for (runs, found) in self.runs.iter_mut().zip(found) {
             runs.push(found);
         }
@@ -92,7 +122,7 @@ impl<'a> Ensemble<'a> {
             None => self.waiting = Some(picture.clone()),
             Some(first) => {
                 for (products, region) in self.products.iter_mut().zip(&self.regions) {
-                    products.push(mean_product(&first, picture, self.reference, region));
+                    products.push(mean_product(&first, picture, reference, region));
                 }
             }
         }
@@ -105,7 +135,7 @@ impl<'a> Ensemble<'a> {
         };
         // A tile that earlier runs did not touch had their common error so far.
         let rest = self.rest;
-        let mut tiles = picture.tiles_with(self.reference);
+        let mut tiles = picture.tiles_with(reference);
         tiles.extend(self.sums.touched().iter().map(|(tile, _)| *tile));
         tiles.sort_unstable();
         tiles.dedup();
@@ -113,17 +143,17 @@ impl<'a> Ensemble<'a> {
             let (sum, square) = self.sums.get_or_insert_with(tile, || {
                 (Box::new([rest.0; TILE_PIXELS]), Box::new([rest.1; TILE_PIXELS]))
             });
-            let (a, b) = (picture.tile(tile), self.reference.tile(tile));
+            let (a, b) = (picture.tile(tile), reference.tile(tile));
             for within in 0..TILE_PIXELS {
                 add(
                     &mut sum[within],
                     &mut square[within],
                     a.map_or(picture.background(), |t| t[within]),
-                    b.map_or(self.reference.background(), |t| t[within]),
+                    b.map_or(reference.background(), |t| t[within]),
                 );
             }
         }
-        add(&mut self.rest.0, &mut self.rest.1, picture.background(), self.reference.background());
+        add(&mut self.rest.0, &mut self.rest.1, picture.background(), reference.background());
     }
 
     /// Calls `each` with the mean errors and the variances over the runs of the
@@ -138,7 +168,7 @@ impl<'a> Ensemble<'a> {
         };
         let mut visited = 0;
         for (tile, (sum, square)) in self.sums.touched() {
-            for within in (0..TILE_PIXELS).filter(|w| region.holds(*tile, *w)) {
+            for within in region.of_tile(*tile).iter_ones() {
                 pixel(&sum[within], &square[within], 1);
                 visited += 1;
             }
@@ -231,7 +261,7 @@ fn mean_product(a: &Picture, b: &Picture, reference: &Picture, region: &Region) 
     let (mut sum, mut visited) = (0.0, 0);
     for tile in tiles {
         let [a, b, r] = [a, b, reference].map(|p| (p.tile(tile), p.background()));
-        for within in (0..TILE_PIXELS).filter(|w| region.holds(tile, *w)) {
+        for within in region.of_tile(tile).iter_ones() {
             let [a, b, r] = [a, b, r].map(|(t, rest)| t.map_or(rest, |t| t[within]));
             sum += product(a, b, r);
             visited += 1;

@@ -11,6 +11,7 @@
 //! samples ([`Convergence`]).
 
 mod convergence;
+mod encoded;
 mod ensemble;
 mod estimate;
 mod filtered;
@@ -23,6 +24,7 @@ mod temporal;
 use serde::{Deserialize, Serialize};
 
 pub use convergence::Convergence;
+pub use encoded::Encoded;
 pub use ensemble::{Ensemble, EnsembleErrors};
 pub use estimate::{Estimate, student_t};
 pub use filtered::filtered_rmse;
@@ -31,8 +33,7 @@ pub use region::{PixelClasses, Region};
 pub use spectrum::Spectrum;
 pub use temporal::Temporal;
 
-use screendoor_trace::picture::{Picture, Space};
-use screendoor_trace::tile::TILE_PIXELS;
+use screendoor_trace::picture::Picture;
 
 /// What one unit of an error is of the range from black to white.
 pub(crate) const UNIT: f64 = 1.0 / 255.0;
@@ -61,68 +62,42 @@ pub struct Errors {
 /// # Panics
 /// Where the frames differ in size.
 pub fn errors(picture: &Picture, reference: &Picture, region: &Region) -> Errors {
+    Encoded::of(reference).errors(picture, reference, &[region]).swap_remove(0)
+}
+
+/// [`Errors::rmse`] alone, which takes no encoding.
+///
+/// # Panics
+/// Where the frames differ in size.
+pub fn rmse(picture: &Picture, reference: &Picture, region: &Region) -> f64 {
     assert_eq!((picture.grid(), picture.space()), (reference.grid(), reference.space()));
-    let mut sums = ErrorSums { space: picture.space(), ..ErrorSums::default() };
-    let mut visited = 0;
+    let (mut square, mut visited) = (0.0, 0);
+    let mut add = |a: [f64; 3], b: [f64; 3], times: u64| {
+        for (a, b) in a.into_iter().zip(b) {
+            square += (a - b) * (a - b) * times as f64;
+        }
+    };
     for tile in picture.tiles_with(reference) {
         let (a, b) = (picture.tile(tile), reference.tile(tile));
-        for within in 0..TILE_PIXELS {
-            if !region.holds(tile, within) {
-                continue;
-            }
+        for within in region.of_tile(tile).iter_ones() {
             visited += 1;
-            sums.add(
+            add(
                 a.map_or(picture.background(), |t| t[within]),
                 b.map_or(reference.background(), |t| t[within]),
+                1,
             );
         }
     }
     // The rest of the region shows both backgrounds.
-    sums.add_many(picture.background(), reference.background(), region.pixels() - visited);
-    sums.finish(region.pixels())
+    if region.pixels() > visited {
+        add(picture.background(), reference.background(), region.pixels() - visited);
+    }
+    root(square, region.pixels())
 }
 
-#[derive(Default)]
-struct ErrorSums {
-    space: Space,
-    square: f64,
-    square_srgb: f64,
-    signed: f64,
-    max: f64,
-}
-
-impl ErrorSums {
-    fn add(&mut self, a: [f64; 3], b: [f64; 3]) {
-        self.add_many(a, b, 1);
-    }
-
-    fn add_many(&mut self, a: [f64; 3], b: [f64; 3], times: u64) {
-        if times == 0 {
-            return;
-        }
-        for (a, b) in a.into_iter().zip(b) {
-            let difference = a - b;
-            if difference == 0.0 {
-                continue;
-            }
-            let encoded = self.space.to_encoded(a) - self.space.to_encoded(b);
-            self.square += difference * difference * times as f64;
-            self.square_srgb += encoded * encoded * times as f64;
-            self.signed += difference * times as f64;
-            self.max = self.max.max(difference.abs());
-        }
-    }
-
-    fn finish(&self, pixels: u64) -> Errors {
-        let count = (3 * pixels).max(1) as f64;
-        Errors {
-            pixels,
-            rmse: (self.square / count).sqrt() / UNIT,
-            rmse_srgb: (self.square_srgb / count).sqrt() / UNIT,
-            mean: self.signed / count / UNIT,
-            max: self.max / UNIT,
-        }
-    }
+/// The root of a mean over a region's pixels and channels, in 8-bit units.
+fn root(square: f64, pixels: u64) -> f64 {
+    (square / (3 * pixels).max(1) as f64).sqrt() / UNIT
 }
 
 #[cfg(test)]
@@ -146,6 +121,7 @@ mod tests {
         assert!((e.rmse - (square / 600.0).sqrt() * 255.0).abs() < 1e-9);
         assert!(e.mean.abs() < 1e-9);
         assert!((e.max - 0.3 * 255.0).abs() < 1e-9);
+        assert_eq!(rmse(&picture, &reference, &Region::frame(grid)), e.rmse);
     }
 
     #[test]
@@ -155,6 +131,7 @@ mod tests {
         let white = Picture::new(grid, [1.0; 3]);
         let e = errors(&white, &black, &Region::frame(grid));
         assert_eq!((e.rmse, e.mean, e.max), (255.0, 255.0, 255.0));
+        assert_eq!(rmse(&white, &black, &Region::frame(grid)), 255.0);
         assert!((e.rmse_srgb - 255.0).abs() < 1e-9);
         let none = errors(&black, &black, &Region::frame(grid));
         assert_eq!((none.rmse, none.max), (0.0, 0.0));

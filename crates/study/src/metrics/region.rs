@@ -16,7 +16,8 @@ pub struct Region {
     pixels: u64,
 }
 
-type TileBits = BitArray<[u64; TILE_PIXELS / 64], Lsb0>;
+/// One bit a pixel of a tile.
+pub(super) type TileBits = BitArray<[u64; TILE_PIXELS / 64], Lsb0>;
 
 impl Region {
     /// The whole frame.
@@ -30,9 +31,36 @@ impl Region {
         Region { grid, bits: Some(bits), pixels }
     }
 
+    /// The pixels for which `has` holds.
+    #[cfg(test)]
+    pub(super) fn of_pixels(grid: TileGrid, has: impl Fn(u32, u32) -> bool) -> Self {
+        let mut bits: TileMap<TileBits> = TileMap::new(grid);
+        for (x, y) in (0..grid.height()).flat_map(|y| (0..grid.width()).map(move |x| (x, y))) {
+            if has(x, y) {
+                let tile = bits.get_or_insert_with(grid.tile(x as u16, y as u16), Default::default);
+                tile.set(TileGrid::within(x as u16, y as u16), true);
+            }
+        }
+        Region::of(grid, bits)
+    }
+
     /// How many pixels it has.
     pub fn pixels(&self) -> u64 {
         self.pixels
+    }
+
+    /// Which pixels of `tile` it has.
+    pub(super) fn of_tile(&self, tile: TileId) -> TileBits {
+        match &self.bits {
+            Some(bits) => bits.get(tile).copied().unwrap_or_default(),
+            None => {
+                let mut held = TileBits::default();
+                for within in 0..TILE_PIXELS {
+                    held.set(within, self.grid.contains(self.grid.pixel(tile, within)));
+                }
+                held
+            }
+        }
     }
 
     /// Whether it has the pixel at place `within` of `tile`.

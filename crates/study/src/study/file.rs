@@ -76,7 +76,8 @@ pub struct Study {
     /// Engines: the first draws what errors are taken of, all are timed.
     #[serde(default = "defaults::engines")]
     pub engines: Vec<EngineName>,
-    /// Timed replays with each engine, after one that is not timed; 0 times nothing.
+    /// Timed replays with each engine, at least; those of the seeds count for the first. 0 times
+    /// nothing.
     #[serde(default = "defaults::timing")]
     pub timing: u32,
     /// Metrics beyond the errors.

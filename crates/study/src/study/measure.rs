@@ -11,7 +11,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use crate::metrics::{
-    Ensemble, EnsembleErrors, Estimate, FlipFigures, Spectrum, errors, filtered_rmse,
+    Ensemble, EnsembleErrors, Estimate, FlipFigures, Spectrum, filtered_rmse, rmse,
 };
 use crate::study::engine::{Engine, FAST, OnGpu};
 use crate::study::file::Metric;
@@ -79,9 +79,27 @@ pub struct Measured {
     pub record: Record,
     /// The picture of the first seed.
     pub picture: Picture,
-    /// Seconds of each replay that counted nothing: of all seeds but the first, or of that
-    /// where it is the only one.
+    /// How long the seeds' replays took.
+    pub timed: Timed,
+}
+
+/// How long replays took that counted nothing, since counting takes time, and were not the
+/// first, which finds caches cold and, on GPUs, programs that are not compiled.
+#[derive(Clone, Debug, Default)]
+pub struct Timed {
+    /// Seconds from the file to the picture.
     pub seconds: Vec<f64>,
+    /// Seconds in which a GPU drew, by its own clock.
+    pub kernel: Vec<f64>,
+}
+
+impl Timed {
+    /// Adds a replay.
+    pub(super) fn add(&mut self, replay: &OneSeed) {
+        self.seconds.push(replay.seconds);
+        let device = replay.gpu.as_ref().and_then(|gpu| gpu.seconds.device.as_ref());
+        self.kernel.extend(device.and_then(|device| device.get("draw").copied()));
+    }
 }
 
 /// Measures a design on a subject, at the reference's sample count.
@@ -99,7 +117,7 @@ pub fn measure(
     let seeds = if promises.seeded { start..end } else { start..start + 1 };
     let run = Run { subject, reference, design, setup };
     let count = seeds.len() as u32;
-    let Looked { seen, ensemble, first, counted, seconds } = run.over(seeds)?;
+    let Looked { seen, ensemble, first, counted, timed } = run.over(seeds)?;
     let [frame, covered, interior, edges] = ensemble;
     let over = |of: &dyn Fn(&Seen) -> f64| Estimate::of(&seen.iter().map(of).collect::<Vec<_>>());
     let sigmas = seen.first().map_or(0, |s| s.filtered_squares.len());
@@ -139,7 +157,7 @@ pub fn measure(
         picture: first.hash(),
         speed: Default::default(),
     };
-    Ok(Measured { record, picture: first, seconds })
+    Ok(Measured { record, picture: first, timed })
 }
 
 /// What is measured, on what and how.
@@ -189,7 +207,7 @@ struct Looked {
     /// The first seed's picture.
     first: Picture,
     counted: Counted,
-    seconds: Vec<f64>,
+    timed: Timed,
 }
 
 impl Run<'_> {
@@ -216,7 +234,7 @@ impl Run<'_> {
         let reference = self.reference;
         let classes = &reference.classes;
         let regions = [&reference.frame, &classes.covered, &classes.interior, &classes.edges];
-        let mut ensemble = Ensemble::new(&reference.picture, &regions);
+        let mut ensemble = Ensemble::against(&reference.picture, &reference.encoded, &regions);
         let start = seeds.start;
         let mut replays = self.replays(self.setup.engine, seeds);
         let first = replays.next().expect("a run has a seed")?;
@@ -224,35 +242,31 @@ impl Run<'_> {
             Some(counted) => counted,
             None => self.counted(start)?,
         };
-        let alone = first.seconds;
         let first = first.replayed.picture;
-        let (mut seen, mut seconds) = (Vec::new(), Vec::new());
+        let (mut seen, mut timed) = (Vec::new(), Timed::default());
         let batch = rayon::current_num_threads().max(1);
         let mut pictures = vec![first.clone()];
         loop {
             for seed in replays.by_ref().take(batch - pictures.len()) {
                 let seed = seed?;
-                seconds.push(seed.seconds);
+                timed.add(&seed);
                 pictures.push(seed.replayed.picture);
             }
             if pictures.is_empty() {
                 break;
             }
-            pictures.iter().for_each(|picture| ensemble.add(picture));
+            ensemble.add_all(&pictures);
             seen.par_extend(pictures.par_iter().map(|picture| self.see(picture)));
             pictures.clear();
         }
-        if seconds.is_empty() {
-            seconds.push(alone);
-        }
         let ensemble = ensemble.finish().try_into().expect("one for each region");
-        Ok(Looked { seen, ensemble, first, counted, seconds })
+        Ok(Looked { seen, ensemble, first, counted, timed })
     }
 
     fn see(&self, picture: &Picture) -> Seen {
         let reference = self.reference;
         let takes = |metric| self.setup.metrics.contains(&metric);
-        let fine = errors(picture, &self.subject.fine, &self.subject.fine_covered).rmse;
+        let fine = rmse(picture, &self.subject.fine, &self.subject.fine_covered);
         let filtered = |sigma: &f64| {
             filtered_rmse(picture, &reference.picture, *sigma, &reference.classes.covered).powi(2)
         };
@@ -266,7 +280,7 @@ impl Run<'_> {
             flip_hdr: flip(Metric::FlipHdr).map(|f| f.hdr(picture).figures()),
             spectrum: takes(Metric::Spectrum).then(|| Spectrum::of(picture, &reference.picture)),
             blocks_square: blocks
-                .map(|(exact, frame)| errors(&averaged(picture, BLOCK), exact, frame).rmse.powi(2)),
+                .map(|(exact, frame)| rmse(&averaged(picture, BLOCK), exact, frame).powi(2)),
         }
     }
 }
@@ -321,18 +335,18 @@ mod tests {
         assert_eq!(of("enderton", 0..3, &metrics).record, found.record);
         let record = &found.record;
         assert_eq!((record.samples, record.seeds, record.scene.as_str()), (4, 3, "cloth"));
-        assert_eq!((record.covered.seeds, found.seconds.len()), (3, 2));
+        assert_eq!((record.covered.seeds, found.timed.seconds.len()), (3, 2));
         assert_eq!(record.picture, found.picture.hash());
         assert!(record.events.fragments > 0 && record.fragments > 0);
         // Noise averages out over blocks, and over a Gaussian.
-        let rmse = record.frame.rmse.value;
-        assert!(rmse > 1.0 && record.blocks.unwrap().value < rmse / 2.0, "{record:?}");
+        let error = record.frame.rmse.value;
+        assert!(error > 1.0 && record.blocks.unwrap().value < error / 2.0, "{record:?}");
         assert!(record.filtered[0].rmse.value < record.covered.rmse.value);
         // The first seed is the one that is asked for.
         assert_ne!(of("enderton", 1..3, &[]).record.picture, record.picture);
         // What has no seeds is replayed once, and what was not asked for is not there.
         let exact = of("exact", 0..3, &[]);
-        assert_eq!((exact.record.seeds, exact.seconds.len()), (1, 1));
+        assert_eq!((exact.record.seeds, exact.timed.seconds.len()), (1, 0));
         assert_eq!((exact.record.covered.rmse.value, exact.record.blocks), (0.0, None));
         // Of all samples the picture of four is not the exact one.
         assert!(exact.record.fine.value > 0.0);

@@ -223,10 +223,15 @@ pub struct SpectrumOverSeeds {
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Speed {
-    /// Seconds from the file to the picture; `None` where the engine cannot do it.
+    /// Seconds from the file to the picture, with so many [`threads`](Speed::threads); `None`
+    /// where the engine cannot do it.
     pub seconds: Option<Spread>,
     /// Seconds in which a GPU draws, by its own clock.
     pub kernel: Option<Spread>,
+    /// Threads that each of these replays had; not known of what was measured before this was
+    /// put down, when they had all of the machine's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub threads: Option<u32>,
     /// Whether its picture is bit for bit the one that the errors are of.
     pub same_bits: Option<bool>,
     /// Why there is no figure.

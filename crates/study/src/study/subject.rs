@@ -1,6 +1,6 @@
 //! What runs are measured on: a trace, and the exact picture at a sample count.
 
-use crate::metrics::{Flip, PixelClasses, Region};
+use crate::metrics::{Encoded, Flip, PixelClasses, Region};
 use crate::study::file::Metric;
 use crate::study::throughput::work;
 use screendoor_designs::{REFERENCE, configure};
@@ -73,6 +73,8 @@ pub struct Reference {
     pub samples: u32,
     /// The exact picture of the same samples.
     pub picture: Picture,
+    /// The same, encoded.
+    pub(super) encoded: Encoded,
     pub(super) frame: Region,
     pub(super) classes: PixelClasses,
     /// Fragments that cover one of the samples.
@@ -102,6 +104,7 @@ impl Reference {
         let blocks = metrics.contains(&Metric::Blocks).then(|| averaged(&picture, BLOCK));
         Ok(Reference {
             samples,
+            encoded: Encoded::of(&picture),
             frame: Region::frame(picture.grid()),
             classes: PixelClasses::of(trace, samples)?,
             fragments: work(trace, samples)?.fragments,

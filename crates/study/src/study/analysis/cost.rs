@@ -134,7 +134,7 @@ mod tests {
         for (i, record) in results.records.iter_mut().enumerate() {
             let s = (i + 1) as f64;
             let seconds = Some(Spread { low: s, median: 2.0 * s, high: 3.0 * s });
-            let speed = Speed { seconds, kernel: None, same_bits: None, missing: None };
+            let speed = Speed { seconds, ..Speed::default() };
             record.speed.insert("fast".into(), speed);
             record.fragments = 1_000_000_000;
         }

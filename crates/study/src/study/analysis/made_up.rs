@@ -291,7 +291,7 @@ fn plausible_record(scene: &str, place: usize, samples: u32, habit: &Habit) -> R
     metrics(&mut r, rmse, &scatter);
     let time = 0.01 * (1.0 + n / 6.0 + f64::from(extra) / 60.0) * (1.0 + scatter(5));
     let spread = |s: f64| Some(Spread { low: 0.96 * s, median: s, high: 1.07 * s });
-    let speed = |seconds| Speed { seconds, kernel: None, same_bits: Some(true), missing: None };
+    let speed = |seconds| Speed { seconds, same_bits: Some(true), ..Speed::default() };
     r.speed.insert("fast".into(), speed(spread(time)));
     if seeded {
         r.speed.insert("gpu".into(), speed(spread(time / 6.0)));

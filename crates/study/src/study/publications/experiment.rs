@@ -203,6 +203,7 @@ impl Lab<'_> {
             return Ok(Found { results, missing });
         }
         let store = Store::begin(&self.place(&study), &study)?;
+        self.lend(&store);
         let watch = |what: &str, done, total| {
             (self.watch)(&format!("{}: {what}", study.name), done, total);
         };
@@ -214,6 +215,26 @@ impl Lab<'_> {
                 "correct that and call it again: the other runs are kept",
             )),
             None => Ok(Found { results, missing }),
+        }
+    }
+
+    /// Gives a study the built-in scenes that another one in this folder has drawn alike, so that
+    /// none is drawn twice. What cannot be lent is drawn.
+    fn lend(&self, to: &Store) {
+        for folder in std::fs::read_dir(self.folder).into_iter().flatten().flatten() {
+            let folder = folder.path();
+            let Ok(from) = Store::open(&folder) else { continue };
+            // Of this program's version, and not the same folder.
+            if folder == to.folder() || self.place(from.study()) != folder {
+                continue;
+            }
+            for (scene, entry) in to.study().scenes.iter().enumerate() {
+                let same = from.study().scenes.iter().position(|other| other == entry);
+                let same = same.filter(|_| from.study().memory == to.study().memory);
+                if let Some(same) = same.filter(|_| entry.is_built_in()) {
+                    let _ = to.borrow_scene(scene, &from, same);
+                }
+            }
         }
     }
 
@@ -257,6 +278,7 @@ impl Quiet {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::Mutex;
 
     /// Two designs on one small scene.
     fn small() -> Study {
@@ -289,6 +311,25 @@ mod tests {
         lab.forget_traces();
         assert!(!lab.place(&small()).join("traces").exists());
         assert_eq!(lab.measure(small()).unwrap().results.records, first);
+    }
+
+    #[test]
+    fn a_scene_that_another_study_has_drawn_is_not_drawn_again() {
+        let quiet = Quiet::new();
+        let said = Mutex::new(Vec::new());
+        let watch = |what: &str, _, _| said.lock().unwrap().push(what.to_string());
+        let lab = Lab { watch: &watch, ..quiet.lab() };
+        let mut other = small();
+        other.name.push_str("-other");
+        other.designs.truncate(1);
+        let larger = other.clone().in_frames(Frames::new(32, 32, 2));
+        let mut traces = Vec::new();
+        for (study, is_drawn) in [(small(), true), (other, false), (larger, true)] {
+            traces.push(lab.measure(study).unwrap().results.scenes[0].content.clone());
+            let said = std::mem::take(&mut *said.lock().unwrap());
+            assert_eq!(said.iter().any(|s| s.contains("capturing")), is_drawn, "{said:?}");
+        }
+        assert!(traces[0] == traces[1] && traces[1] != traces[2]);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! The pictures of LK's figures, and the noise of those that show it.
 
+use crate::study::publications::experiment::Lab;
 use crate::study::publications::noise::{CORRELATION_SEEDS, FigureNoise, Noise, edge_noise, noise};
 use crate::study::publications::sampling::layers;
 use crate::study::publications::table_1::study_of;
@@ -69,7 +70,7 @@ impl Panels<'_> {
 }
 
 /// The pictures by name, and the noise in them.
-pub(super) fn figures(effort: Effort) -> Result<(Vec<NamedPicture>, FigureNoise)> {
+pub(super) fn figures(lab: &Lab<'_>, effort: Effort) -> Result<(Vec<NamedPicture>, FigureNoise)> {
     let mut shown = Vec::new();
     let seeds = effort.seeds;
     let whole = |p: &Picture| p.clone();
@@ -100,7 +101,7 @@ pub(super) fn figures(effort: Effort) -> Result<(Vec<NamedPicture>, FigureNoise)
     ])?;
     // Figures 1, right, 6 and 10: the cloth, triangles in random order.
     let side = effort.side;
-    let cloth = built_in("builtin:cloth", effort)?;
+    let cloth = built_in(lab, "builtin:cloth", effort)?;
     let inset = [side * 3 / 8, side * 5 / 16];
     let corner = |p: &Picture| crop(p, inset, side / 4);
     let seeds = effort.seeds;
@@ -119,7 +120,7 @@ pub(super) fn figures(effort: Effort) -> Result<(Vec<NamedPicture>, FigureNoise)
             shown.push((name, replay(spec, &cloth, 16, 0)?.picture));
         }
         // Figure 9: the motor.
-        let engine = built_in("builtin:engine", effort)?;
+        let engine = built_in(lab, "builtin:engine", effort)?;
         for (name, design) in [("figure-9-enderton", "enderton"), ("figure-9-lk", "lk")] {
             shown.push((name, replay(design, &engine, 16, 0)?.picture));
         }
@@ -128,9 +129,13 @@ pub(super) fn figures(effort: Effort) -> Result<(Vec<NamedPicture>, FigureNoise)
     Ok((shown, noise))
 }
 
-/// A scene as table 1 has it.
-fn built_in(source: &str, effort: Effort) -> Result<Trace> {
+/// A scene as table 1 has it: its trace, where the table has just been measured on it.
+fn built_in(lab: &Lab<'_>, source: &str, effort: Effort) -> Result<Trace> {
     let study = study_of(effort)?;
     let entry = study.scenes.iter().find(|s| s.drawn() == source).expect("it is in the table");
+    let drawn = lab.place(&study).join("traces").join(format!("{}.arrow", entry.name));
+    if drawn.is_file() {
+        return Trace::open(&drawn);
+    }
     capture(source, &entry.options(entry.camera_choice(Path::new("")).choose(&[])?)?, entry.white)
 }

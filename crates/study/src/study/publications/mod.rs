@@ -98,7 +98,7 @@ pub fn reproduce(lab: &Lab<'_>, effort: Effort) -> Result<Publications> {
         false => (table_1::vary(lab, effort)?, sampling::means(lab, effort)?),
     };
     (lab.watch)("figures", 0, 1);
-    let (pictures, noise) = figures::figures(effort)?;
+    let (pictures, noise) = figures::figures(lab, effort)?;
     let (pixel_orders, gallery) = match effort.brief {
         true => (Vec::new(), Vec::new()),
         false => (sampling::pixel_orders(effort)?, figures::gallery()?),

@@ -3,7 +3,7 @@
 
 use serde::Serialize;
 
-use crate::metrics::{Estimate, PixelClasses, Region, UNIT, errors};
+use crate::metrics::{Estimate, PixelClasses, Region, UNIT, rmse};
 use crate::study::measure::averaged;
 use crate::study::publications::pictures;
 use screendoor_trace::error::Result;
@@ -71,13 +71,13 @@ pub(super) fn noise(
     pictures: &[Picture],
     exact: &Picture,
 ) -> Noise {
-    let rmse = BLOCKS.map(|side| {
+    let over_blocks = BLOCKS.map(|side| {
         let exact = averaged(exact, side);
         let frame = Region::frame(exact.grid());
-        let square = |p: &Picture| errors(&averaged(p, side), &exact, &frame).rmse.powi(2);
+        let square = |p: &Picture| rmse(&averaged(p, side), &exact, &frame).powi(2);
         Estimate::of(&pictures.iter().map(square).collect::<Vec<_>>()).sqrt()
     });
-    Noise { design, samples, rmse }
+    Noise { design, samples, rmse: over_blocks }
 }
 
 /// The noise in the lower third of the ramps.
@@ -111,8 +111,8 @@ pub(super) fn edge_noise(
         at_edges.push(mean_square(&edges));
         beside.push(mean_square(&inside));
     }
-    let rmse = |squares: &[f64]| Estimate::of(squares).sqrt();
-    Ok(EdgeNoise { design, edges: rmse(&at_edges), inside: rmse(&beside) })
+    let root = |squares: &[f64]| Estimate::of(squares).sqrt();
+    Ok(EdgeNoise { design, edges: root(&at_edges), inside: root(&beside) })
 }
 
 #[cfg(test)]

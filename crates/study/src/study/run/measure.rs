@@ -1,18 +1,16 @@
 //! One run of a study: its record, and how fast engines replay it.
 
 use std::collections::BTreeMap;
-use std::time::Instant;
 
 use crate::study::engine::{Engine, EngineName};
 use crate::study::file::Study;
-use crate::study::measure::{Reference, Setup, Subject, measure};
+use crate::study::measure::{Reference, Setup, Subject, Timed, measure, replays};
 use crate::study::record::{Record, Speed};
 use crate::study::run::scene::Watch;
 use crate::study::run::tasks::Job;
 use crate::study::throughput::Spread;
 use screendoor_designs::Configured;
 use screendoor_rop::ReplayOptions;
-use screendoor_trace::error::Result;
 use screendoor_trace::picture::Picture;
 
 /// The engines of a study; why one could not be made ready.
@@ -37,11 +35,11 @@ pub(super) fn measure_job(
     let seeds = study.first_seed..study.first_seed + study.seeds;
     let setup = Setup { engine, seeds, metrics: &study.metrics };
     let measured = measure(subject, reference, &design, &setup).map_err(|e| e.to_string())?;
-    let timed = Timing { study, subject, samples: job.samples, design: &design };
+    let timing = Timing { study, subject, samples: job.samples, design: &design };
     let record = Record {
         id: job.id.clone(),
         series: job.series.clone(),
-        speed: timed.speed(engines, &measured.record.picture),
+        speed: timing.speed(engines, measured.timed, &measured.record.picture),
         ..measured.record
     };
     // What is not finite would be lost in the file, and no later run would know why.
@@ -62,74 +60,82 @@ struct Timing<'a> {
 }
 
 impl Timing<'_> {
-    /// Times every engine, one after the other in each round, so that what is compared is
-    /// measured at about the same time.
-    fn speed(&self, engines: &Engines, expected: &str) -> BTreeMap<String, Speed> {
+    /// Times every engine until there are as many replays as the study asks for. The first
+    /// engine begins with those of the seeds, which are replays like any other; the others with
+    /// one that is not timed. What is left is done one engine after the other in each round, so
+    /// that what is compared is measured at about the same time.
+    fn speed(&self, engines: &Engines, of_seeds: Timed, expected: &str) -> BTreeMap<String, Speed> {
         if self.study.timing == 0 {
             return BTreeMap::new();
         }
-        let mut timed: Vec<Timed> = engines.iter().map(|(name, _)| Timed::new(*name)).collect();
-        for round in 0..=self.study.timing {
-            for (timed, (_, engine)) in timed.iter_mut().zip(engines) {
-                if timed.missing.is_some() {
+        let mut list: Vec<OfEngine> =
+            engines.iter().map(|(name, _)| OfEngine::new(*name)).collect();
+        if let Some(first) = list.first_mut() {
+            // Errors are of its picture.
+            (first.timed, first.same_bits) = (of_seeds, Some(true));
+        }
+        for _ in 0..=self.study.timing {
+            for (of_engine, (_, engine)) in list.iter_mut().zip(engines) {
+                if of_engine.missing.is_some() || of_engine.is_done(self.study.timing) {
                     continue;
                 }
                 let replayed = match engine {
                     Err(why) => Err(why.clone()),
-                    Ok(engine) => self.time(engine, timed, expected, round == 0),
+                    Ok(engine) => self.time(engine, of_engine, expected),
                 };
-                timed.missing = replayed.err();
+                of_engine.missing = replayed.err();
             }
         }
-        timed.into_iter().map(|t| (t.name.name().to_string(), t.finish())).collect()
+        list.into_iter().map(|one| (one.name.name().to_string(), one.finish())).collect()
     }
 
     fn time(
         &self,
         engine: &Engine,
-        timed: &mut Timed,
+        of_engine: &mut OfEngine,
         expected: &str,
-        is_warming_up: bool,
     ) -> Result<(), String> {
         if matches!(engine, Engine::Gpu(..)) && !self.design.is_ported() {
             return Err("no port to GPUs".to_string());
         }
         let options = ReplayOptions { memory: self.study.memory << 20, ..ReplayOptions::default() };
         let (trace, seed) = (&self.subject.trace, self.study.first_seed);
-        let start = Instant::now();
-        let replayed = engine.replay(self.design, trace, self.samples, seed, &options);
-        let seconds = start.elapsed().as_secs_f64();
-        let (replayed, gpu) = replayed.map_err(|e| e.to_string())?;
-        if is_warming_up {
-            timed.same_bits = Some(replayed.picture.hash() == expected);
-            return Ok(());
+        let mut replay = replays(engine, self.design, trace, self.samples, [seed], options);
+        let replay = replay.next().expect("there is one seed").map_err(|e| e.to_string())?;
+        if of_engine.same_bits.is_none() {
+            of_engine.same_bits = Some(replay.replayed.picture.hash() == expected);
+        } else {
+            of_engine.timed.add(&replay);
         }
-        timed.seconds.push(seconds);
-        let drawn = gpu.and_then(|g| g.seconds.device?.get("draw").copied());
-        timed.kernel.extend(drawn);
         Ok(())
     }
 }
 
 /// An engine while it is timed.
-struct Timed {
+struct OfEngine {
     name: EngineName,
     missing: Option<String>,
+    /// Not known before the replay that is not timed.
     same_bits: Option<bool>,
-    seconds: Vec<f64>,
-    kernel: Vec<f64>,
+    timed: Timed,
 }
 
-impl Timed {
+impl OfEngine {
     fn new(name: EngineName) -> Self {
-        Timed { name, missing: None, same_bits: None, seconds: Vec::new(), kernel: Vec::new() }
+        OfEngine { name, missing: None, same_bits: None, timed: Timed::default() }
+    }
+
+    fn is_done(&self, timing: u32) -> bool {
+        self.same_bits.is_some() && self.timed.seconds.len() >= timing as usize
     }
 
     fn finish(self) -> Speed {
-        let known = |list: &[f64]| Spread::of(list).filter(|_| self.missing.is_none());
+        let is_known = self.missing.is_none();
+        let known = |list: &[f64]| Spread::of(list).filter(|_| is_known);
         Speed {
-            seconds: known(&self.seconds),
-            kernel: known(&self.kernel),
+            seconds: known(&self.timed.seconds),
+            kernel: known(&self.timed.kernel),
+            threads: is_known.then(|| rayon::current_num_threads() as u32),
             same_bits: self.same_bits,
             missing: self.missing,
         }

@@ -1,6 +1,7 @@
 //! Measures a study, run by run. Each run's result is a file; what is there is not
 //! measured again.
 
+mod apart;
 mod check;
 mod folder;
 mod json;
@@ -13,6 +14,7 @@ mod tasks;
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 
 pub use check::check;
 pub use json::read_json;
@@ -98,19 +100,44 @@ impl Runner<'_> {
         let gpu = engines.iter().find_map(|(_, e)| e.as_ref().ok()?.adapter());
         self.store.add_machine(&Machine::here(gpu.map(ToString::to_string)))?;
         let mut open = Open::default();
-        for job in pending {
-            let done = (outcome.measured + outcome.there + outcome.failed.len()) as u64;
-            let watch = |what: &str| (self.watch)(what, done, tasks.len() as u64);
-            match guarded(|| self.one(job, &engines, &mut open, &watch)) {
-                Ok(()) => outcome.measured += 1,
+        let outcome = Mutex::new(outcome);
+        let told = || outcome.lock().unwrap_or_else(PoisonError::into_inner);
+        let watch = |what: &str| {
+            let Outcome { measured, there, failed } = &*told();
+            (self.watch)(what, (measured + there + failed.len()) as u64, tasks.len() as u64);
+        };
+        let put = |job: &Job, done: std::result::Result<(), Failure>| -> Result<()> {
+            match done {
+                Ok(()) => told().measured += 1,
                 Err(Failure::Fatal(error)) => return Err(error),
                 Err(Failure::Run(why)) => {
                     self.store.put_failure(job, &why)?;
-                    outcome.failed.push((job.id.clone(), why));
+                    told().failed.push((job.id.clone(), why));
                 }
             }
+            Ok(())
+        };
+        for jobs in pending.chunk_by(|a, b| (a.scene, a.samples) == (b.scene, b.samples)) {
+            let mut shared = None;
+            let opened = guarded(|| {
+                shared = Some(open.at(self, jobs[0], &watch)?);
+                Ok(())
+            });
+            match (opened, shared) {
+                (Ok(()), Some((scene, reference))) => {
+                    let cores = apart::cores(&scene.subject, &engines);
+                    apart::each(jobs, cores, |job| {
+                        put(job, guarded(|| self.one(job, &engines, scene, reference, &watch)))
+                    })?;
+                }
+                (Err(Failure::Fatal(error)), _) => return Err(error),
+                (Err(Failure::Run(why)), _) => {
+                    jobs.iter().try_for_each(|job| put(job, Err(Failure::Run(why.clone()))))?;
+                }
+                (Ok(()), None) => unreachable!("what was opened is there"),
+            }
         }
-        Ok(outcome)
+        Ok(outcome.into_inner().unwrap_or_else(PoisonError::into_inner))
     }
 
     fn engines(&self) -> Engines {
@@ -125,10 +152,10 @@ impl Runner<'_> {
         &self,
         job: &Job,
         engines: &Engines,
-        open: &mut Open,
+        scene: &OpenScene,
+        reference: &Reference,
         watch: Watch<'_>,
     ) -> std::result::Result<(), Failure> {
-        let (scene, reference) = open.at(self, job, watch)?;
         let study = self.store.study();
         let (record, picture) = measure_job(study, engines, &scene.subject, reference, job, watch)
             .map_err(Failure::Run)?;

@@ -96,6 +96,23 @@ impl Store {
         format!("traces/{}.arrow", self.study.scenes[scene].name)
     }
 
+    /// Takes a scene's facts and its trace, which it shares, from another study that has the same
+    /// scene, where they are there and not here.
+    pub(in crate::study) fn borrow_scene(
+        &self,
+        scene: usize,
+        from: &Store,
+        other: usize,
+    ) -> io::Result<()> {
+        let trace = self.folder.join(self.trace_name(scene));
+        let facts = self.scene_file(scene);
+        if trace.exists() || facts.exists() {
+            return Ok(());
+        }
+        std::fs::hard_link(from.folder.join(from.trace_name(other)), trace)?;
+        std::fs::hard_link(from.scene_file(other), facts)
+    }
+
     /// A run's record.
     pub fn record_file(&self, id: &str) -> PathBuf {
         record_path(&self.folder, id)
