@@ -406,7 +406,7 @@ impl<const N: usize> FastReferences<N> for Summed {
             simd,
             #[inline(always)]
             |_| {
-                tooth = tooth + samples.threshold();
+                tooth += samples.threshold();
                 tooth
             },
         )

@@ -104,6 +104,7 @@ impl<const N: usize> FastSampler<N> for FastEnderton<N> {
     }
 }
 
+#[allow(clippy::needless_range_loop, reason = "loops over samples are unrolled into registers")]
 impl<const N: usize> Abreast<N> for FastEnderton<N> {
     type Kept = u32;
     /// What the words of a pixel's fragments have in common.
@@ -157,7 +158,7 @@ impl<const N: usize> Abreast<N> for FastEnderton<N> {
             counted.hashed(count);
             let mut written = *met.passes;
             for s in 0..N {
-                written[s] = written[s] & (words[s].simd_lt(met.threshold) | met.opaque);
+                written[s] &= words[s].simd_lt(met.threshold) | met.opaque;
             }
             return written;
         }

@@ -156,8 +156,8 @@ fn mean<S: Simd, const N: usize>(
     let (mut sum, mut others) = (f32x4::splat(simd, 0.0), u32x4::splat(simd, 0));
     for s in 0..N {
         let colour = colour(s);
-        others = others | (colour.bitcast::<u32x4<S>>() ^ first.bitcast::<u32x4<S>>());
-        sum = sum + colour;
+        others |= colour.bitcast::<u32x4<S>>() ^ first.bitcast::<u32x4<S>>();
+        sum += colour;
     }
     let mean = sum / N as f32;
     // Sums of finite colours that are too large.
@@ -233,7 +233,7 @@ impl<S: Simd, A: Abreast<N>, const N: usize> Rounds<'_, S, A, N> {
             if P::LISTENS || self.several {
                 let written = drawn.set(simd);
                 counted.samples(drawn.coverage, drawn.passed, written);
-                occupied = occupied | written;
+                occupied |= written;
             }
             counted.next_round(tally);
         }
@@ -536,11 +536,11 @@ fn flawed<S: Simd, const N: usize>(
     mut drawn: Drawn<S, N>,
 ) -> Drawn<S, N> {
     match flaw {
-        Some(Flaw::Depth(lane)) => drawn.z[lane] = drawn.z[lane] ^ i32x16::splat(simd, 1),
+        Some(Flaw::Depth(lane)) => drawn.z[lane] ^= i32x16::splat(simd, 1),
         Some(Flaw::Choice(lane)) => {
             let mine =
                 (drawn.passed & u32x16::splat(simd, bit(N, lane))).simd_gt(u32x16::splat(simd, 0));
-            drawn.written[lane] = drawn.written[lane] ^ mine;
+            drawn.written[lane] ^= mine;
         }
         None => {}
     }

@@ -43,7 +43,7 @@ pub(super) fn each<S: Simd, const N: usize>(
     let mut hits = none;
     for n in 0..N {
         let hit = values_bit::<S, N>(simd, n);
-        hits = hits | limits.pass(value(n as u32)).select(hit, none);
+        hits |= limits.pass(value(n as u32)).select(hit, none);
     }
     hits
 }
@@ -108,7 +108,7 @@ fn added<S: Simd, const N: usize>(
         let mut sum = top;
         for by in 1..5 {
             if factor >> by & 1 == 1 {
-                sum = sum + shifted(by);
+                sum += shifted(by);
             }
         }
         sum
@@ -162,7 +162,7 @@ pub(in crate::stochastic::fast) fn nested<S: Simd, const N: usize, const ROUNDS:
     let mut hits = word(0);
     for i in 0..Fields::<N>::WORDS {
         let failed = (strata[i] + beyond) >> (Fields::<N>::WIDTH - 1 - i as u32);
-        hits = hits | (!failed & word(Fields::<N>::ONES << i));
+        hits |= !failed & word(Fields::<N>::ONES << i);
     }
     // Four bits of each byte side by side.
     let hits = (hits | hits >> 4) & word(0x00ff_00ff);

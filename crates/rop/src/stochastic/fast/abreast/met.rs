@@ -109,7 +109,8 @@ pub(super) fn words_of<S: Simd>(vector: u32x16<S>) -> [u32; 16] {
 pub struct Counted<S: Simd, P> {
     simd: S,
     sums: [u32x16<S>; 9],
-    /// Sorts by their length from 2 on: four bits each, seven to a word.
+    /// Sorts by their length: four bits each, of 2 to 8 samples in the one, of 9 to 16 in the
+    /// other.
     sorts: [u32x16<S>; 2],
     sorts_in_bytes: [[u32x16<S>; 2]; 2],
     rounds: u32,
@@ -146,7 +147,7 @@ impl<S: Simd, P: Probe> Counted<S, P> {
     #[inline(always)]
     fn add(&mut self, what: Count, counts: u32x16<S>) {
         if P::LISTENS {
-            self.sums[what as usize] = self.sums[what as usize] + counts;
+            self.sums[what as usize] += counts;
         }
     }
 
@@ -213,10 +214,10 @@ impl<S: Simd, P: Probe> Counted<S, P> {
         // Of lengths that a word has no place for, nothing is left.
         let by = (samples - word(2)) << 2;
         let add = |by: u32x16<S>| left_by(self.simd, word(1), by.min(word(32)));
-        self.sorts[0] = self.sorts[0] + add(by);
+        self.sorts[0] += add(by);
         if N > 8 {
             // From 9 on.
-            self.sorts[1] = self.sorts[1] + add(by - word(28));
+            self.sorts[1] += add(by - word(28));
         }
     }
 
@@ -225,9 +226,9 @@ impl<S: Simd, P: Probe> Counted<S, P> {
     pub(super) fn next_round(&mut self, tally: &mut Tally<'_, P>) {
         if P::LISTENS {
             self.rounds += 1;
-            if self.rounds % 15 == 0 {
+            if self.rounds.is_multiple_of(15) {
                 self.widen();
-                if self.rounds % 240 == 0 {
+                if self.rounds.is_multiple_of(240) {
                     self.tell_sorts(tally);
                 }
             }
@@ -238,8 +239,8 @@ impl<S: Simd, P: Probe> Counted<S, P> {
     fn widen(&mut self) {
         let low = u32x16::splat(self.simd, 0x0f0f_0f0f);
         for (narrow, [even, odd]) in self.sorts.iter_mut().zip(&mut self.sorts_in_bytes) {
-            *even = *even + (*narrow & low);
-            *odd = *odd + ((*narrow >> 4) & low);
+            *even += *narrow & low;
+            *odd += (*narrow >> 4) & low;
             *narrow = u32x16::splat(self.simd, 0);
         }
     }
@@ -251,8 +252,8 @@ impl<S: Simd, P: Probe> Counted<S, P> {
                 for lane in words_of(*bytes) {
                     for (place, byte) in lane.to_le_bytes().into_iter().enumerate() {
                         let place = 2 * place + odd;
-                        // The eighth is the next word's first.
-                        if place < 7 {
+                        // The first word's eighth is the second's first.
+                        if place < 7 || word == 1 {
                             tally.sorts(7 * word + place + 2, u64::from(byte));
                         }
                     }

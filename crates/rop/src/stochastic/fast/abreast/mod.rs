@@ -8,6 +8,11 @@
 //! comparisons that sort a fragment's samples grow as the square of their number:
 //! [`worth_it`] says where it pays. The bits are the same.
 
+#![allow(
+    clippy::needless_range_loop,
+    reason = "loops over samples are unrolled into registers, several lists at a time"
+)]
+
 mod draw;
 mod hits;
 mod lists;

@@ -32,6 +32,7 @@ fn fragments(samples: u32, seed: u32, near: bool) -> Vec<Fragment> {
     let count = 1500 + random.below(2000);
     let fragment = |i: u32| {
         let bits = u64::from(random.word()) << 32 | u64::from(random.word());
+        let bits = if random.below(3) == 0 { u64::MAX } else { bits };
         let mask = SampleMask(bits | 1 << random.below(samples)) & SampleMask::first(samples);
         let z = match random.below(3) {
             0 => (1 << 30) + random.below(1 << 16),
