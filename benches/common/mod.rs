@@ -84,7 +84,8 @@ pub enum Work {
     Count,
     /// Clearing and drawing into a tile's state, all of its fragments at once.
     Draw,
-    /// The same, a block at a time: what does not pay for all at once is not done.
+    /// Clearing, drawing a block at a time, as is done with few fragments of a tile, and
+    /// resolving.
     Blocks,
 }
 
@@ -98,9 +99,9 @@ pub fn draw(
 ) -> (TilePixels, Duration) {
     let mut events = EventCounts::default();
     let near = black_box(blocks.clone());
-    let resolved = matches!(work, Work::Picture | Work::Count);
+    let resolved = work != Work::Draw;
     let start = Instant::now();
-    if resolved && engine.passes() == 1 {
+    if matches!(work, Work::Picture | Work::Count) && engine.passes() == 1 {
         let told = told(&mut events, work);
         let mut list = BlockList::new(&near);
         if let Some(pixels) = engine.picture(frame.grid, *tile, &mut list, told) {

@@ -384,7 +384,7 @@ impl<const N: usize> FastReferences<N> for Summed {
     }
 
     fn goes_abreast(&self) -> bool {
-        // So few samples exchange no places.
+        // Samples as few as are drawn so exchange no places.
         N as u32 <= FEW
     }
 

@@ -5,8 +5,8 @@ use fearless_simd::{Simd, i32x16, mask32x16, u32x16};
 
 use crate::enderton::{Among, EndertonSampler, MaskRule, SeedBy, Words, pixel_word};
 use screendoor_rop::fast::{
-    Abreast, Counted, FastSampler, Lanes, Loaded, Met, Offered, Ranks, Source, Tally, below, bit,
-    gather, left_by, mixed, picked, ranks_of_distinct, stride,
+    Abreast, Counted, FastSampler, Lanes, Loaded, Met, Offered, Ranks, STRIDE, Source, Tally,
+    below, bit, gather, left_by, mixed, picked, ranks_of_distinct,
 };
 use screendoor_rop::{Dither, Probe, Round, Samples, Site};
 use screendoor_trace::random::{GOLDEN, MIX, hash};
@@ -169,8 +169,8 @@ impl<const N: usize> Abreast<N> for FastEnderton<N> {
         let high = (met.threshold >> 16) * count + (xi >> 16);
         let chosen = met.opaque.select(count, (high + (low >> 16)) >> 16);
         // The first so many numbers.
-        let all = (0..N).fold(0, |all, n| all | bit(N, n));
-        let beyond = left_by(simd, word(all), chosen * word(stride(N)));
+        let all = (0..N).fold(0, |all, n| all | bit(n));
+        let beyond = left_by(simd, word(all), chosen * word(STRIDE));
         let hits = !beyond & word(all);
         // Words in the order of signed numbers; of samples that are not among them, more than
         // any or as much.
@@ -179,7 +179,7 @@ impl<const N: usize> Abreast<N> for FastEnderton<N> {
         let mut outside = [some; N];
         for s in 0..N {
             keys[s] = signed(words[s] ^ word(1 << 31));
-            outside[s] = (from & word(bit(N, s))).simd_eq(none);
+            outside[s] = (from & word(bit(s))).simd_eq(none);
             others[s] = outside[s].select(others[s], keys[s]);
         }
         let ranks = Ranks::<S, N>::by(

@@ -25,8 +25,8 @@ mod twin;
 
 pub use crate::lanes::{Count, Lanes, Width, levels};
 pub use abreast::{
-    Abreast, Counted, Met, NumberedAbreast, OneByOne, Ranks, Source, bit, gather, left_by, mixed,
-    stride,
+    Abreast, Counted, Met, NumberedAbreast, OneByOne, Ranks, STRIDE, Source, bit, gather, left_by,
+    mixed,
 };
 pub use comb::teeth;
 pub use limit::{Limit, below};

@@ -187,7 +187,7 @@ impl<H: HashBy, const N: usize> FastReferences<N> for H {
     ) -> u32x16<S> {
         counted.hashed(samples.count);
         let hits = all_abreast::<S, N>(self.reference(), simd, samples);
-        from_first::<S, N>(simd, hits, samples.first)
+        from_first(simd, hits, samples.first)
     }
 }
 

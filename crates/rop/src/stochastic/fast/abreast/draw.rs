@@ -70,7 +70,7 @@ pub(in crate::stochastic::fast) fn draw<S, F, A, P, const N: usize>(
         if several {
             for (pixel, set) in pixels.iter().zip(words_of(occupied)) {
                 if let Some(sums) = &mut tile.sums[usize::from(*pixel)] {
-                    sums.occupied |= SampleMask(unpack::<N>(set).into());
+                    sums.occupied |= SampleMask(unpack(set).into());
                 }
             }
         }
@@ -262,7 +262,7 @@ impl<S: Simd, A: Abreast<N>, const N: usize> Rounds<'_, S, A, N> {
             let covers = (last & word(1 << i)).simd_gt(none);
             passes[i] = covers & !z[i].simd_gt(held.depth[i]);
             keys[i] = passes[i].select(held.depth[i], keys[i]);
-            passed = passes[i].select(passed | word(bit(N, i)), passed);
+            passed = passes[i].select(passed | word(bit(i)), passed);
         }
         let first = step.number * LANES;
         let source = match step.group.sources.get(first..first + LANES) {
@@ -395,7 +395,7 @@ impl<S: Simd, const N: usize> Drawn<S, N> {
     fn set(&self, simd: S) -> u32x16<S> {
         let mut set = u32x16::splat(simd, 0);
         for i in 0..N {
-            set = self.written[i].select(set | u32x16::splat(simd, bit(N, i)), set);
+            set = self.written[i].select(set | u32x16::splat(simd, bit(i)), set);
         }
         set
     }
@@ -539,7 +539,7 @@ fn flawed<S: Simd, const N: usize>(
         Some(Flaw::Depth(lane)) => drawn.z[lane] ^= i32x16::splat(simd, 1),
         Some(Flaw::Choice(lane)) => {
             let mine =
-                (drawn.passed & u32x16::splat(simd, bit(N, lane))).simd_gt(u32x16::splat(simd, 0));
+                (drawn.passed & u32x16::splat(simd, bit(lane))).simd_gt(u32x16::splat(simd, 0));
             drawn.written[lane] ^= mine;
         }
         None => {}

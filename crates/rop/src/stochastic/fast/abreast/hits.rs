@@ -7,7 +7,7 @@
 //! `y = L·c`, a round is `t ^= (top_b(y) + c·t) mod N`, `L = (L ^ y) mod 2^(32−b)`. A value
 //! is less than `T` where `t < top_b(T)`, or `t = top_b(T)` and `L < T mod 2^(32−b)`.
 //!
-//! Strata of up to 8 samples take four bits of one word, those of 16 bytes of four words.
+//! The strata of up to 8 numbers take four bits each of one word.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, mask32x16, u32x16};
@@ -42,48 +42,33 @@ pub(super) fn each<S: Simd, const N: usize>(
     let none = u32x16::splat(simd, 0);
     let mut hits = none;
     for n in 0..N {
-        let hit = values_bit::<S, N>(simd, n);
+        let hit = u32x16::splat(simd, bit(n));
         hits |= limits.pass(value(n as u32)).select(hit, none);
     }
     hits
 }
 
-#[inline(always)]
-fn values_bit<S: Simd, const N: usize>(simd: S, n: usize) -> u32x16<S> {
-    u32x16::splat(simd, bit(N, n))
+/// The lowest bit of each stratum.
+const ONES: u32 = 0x1111_1111;
+/// The upper bit of each stratum's four.
+const UPPER: u32 = 0x8888_8888;
+
+/// The bits of strata of so many numbers.
+const fn strata_bits(numbers: usize) -> u32 {
+    (numbers as u32 - 1) * ONES
 }
 
-/// Strata as they lie in words.
-struct Fields<const N: usize>;
-
-impl<const N: usize> Fields<N> {
-    /// Bits of a stratum.
-    const BITS: u32 = N.trailing_zeros();
-    const WORDS: usize = if N <= 8 { 1 } else { N / 4 };
-    const WIDTH: u32 = if N <= 8 { 4 } else { 8 };
-    /// The lowest bit of each field.
-    const ONES: u32 = if N <= 8 { 0x1111_1111 } else { 0x0101_0101 };
-    const UPPER: u32 = Self::ONES << (Self::WIDTH - 1);
-    const STRATA: u32 = (N as u32 - 1) * Self::ONES;
-
-    /// The number whose stratum is in field `field` of word `word`.
-    const fn number(word: usize, field: usize) -> usize {
-        field * Self::WORDS + word
+/// The strata where numbers are added: their bits in reverse.
+const fn reversed_numbers(numbers: usize) -> u32 {
+    let (mut bits, mut n) = (0, 0);
+    while n < numbers {
+        bits |= ((n as u32).reverse_bits() >> (32 - numbers.trailing_zeros())) << (4 * n);
+        n += 1;
     }
-
-    /// Where numbers are added: their bits in reverse.
-    const fn first(word: usize) -> u32 {
-        let (mut bits, mut field) = (0, 0);
-        while field < 32 / Self::WIDTH as usize {
-            let number = (Self::number(word, field) % N) as u32;
-            bits |= (number.reverse_bits() >> (32 - Self::BITS)) << (Self::WIDTH * field as u32);
-            field += 1;
-        }
-        bits
-    }
+    bits
 }
 
-/// `top_b(y) + factor·t` in each field, but for what lies above a stratum's bits.
+/// `top_b(y) + factor·t` in each stratum's four bits, the lower `b` of them.
 #[inline(always)]
 fn added<S: Simd, const N: usize>(
     simd: S,
@@ -93,25 +78,17 @@ fn added<S: Simd, const N: usize>(
 ) -> u32x16<S> {
     let word = |word: u32| u32x16::splat(simd, word);
     let factor = factor % N as u32;
-    // The bits of a field that are left of it, shifted.
+    // The bits of a stratum that are left of it, shifted.
     let shifted = |by: u32| {
-        let kept = ((N as u32 - 1) << by & (N as u32 - 1)) * Fields::<N>::ONES;
+        let kept = ((N as u32 - 1) << by & (N as u32 - 1)) * ONES;
         (strata << by) & word(kept)
     };
-    let less = (N as u32 - factor) % N as u32;
-    if factor == 0 {
-        top
-    } else if !factor.is_power_of_two() && less.is_power_of_two() {
-        // With the upper bit of each field, nothing is borrowed from the next.
-        (top | word(Fields::<N>::UPPER)) - shifted(less.trailing_zeros())
-    } else {
-        let mut sum = top;
-        for by in 1..5 {
-            if factor >> by & 1 == 1 {
-                sum += shifted(by);
-            }
-        }
-        sum
+    match factor {
+        0 => top,
+        _ if factor.is_power_of_two() => top + shifted(factor.trailing_zeros()),
+        // Six of eight is two less than nothing. With the upper bit of each four, nothing is
+        // borrowed from the next.
+        _ => (top | word(UPPER)) - shifted((N as u32 - factor).trailing_zeros()),
     }
 }
 
@@ -131,40 +108,23 @@ pub(in crate::stochastic::fast) fn nested<S: Simd, const N: usize, const ROUNDS:
         }
         return limits.pass(x).select(word(all(N)), word(0));
     }
-    let top = |x: u32x16<S>| (x >> (32 - Fields::<N>::BITS)) * word(Fields::<N>::ONES);
-    let low = word(u32::MAX >> Fields::<N>::BITS);
-    let kept = word(Fields::<N>::STRATA);
-    // Up to four words are needed.
-    let mut strata = [word(0); 4];
-    let start = top(x);
-    for i in 0..Fields::<N>::WORDS {
-        strata[i] = (start + word(Fields::<N>::first(i))) & kept;
-    }
+    let bits = N.trailing_zeros();
+    let top = |x: u32x16<S>| (x >> (32 - bits)) * word(ONES);
+    let low = word(u32::MAX >> bits);
+    let kept = word(strata_bits(N));
+    let mut strata = (top(x) + word(reversed_numbers(N))) & kept;
     let mut lower = x & low;
     for factor in &LK2011[..ROUNDS] {
         let y = lower * word(*factor);
-        let top = top(y);
-        for i in 0..Fields::<N>::WORDS {
-            strata[i] = strata[i] ^ (added::<S, N>(simd, strata[i], top, *factor) & kept);
-        }
+        strata = strata ^ (added::<S, N>(simd, strata, top(y), *factor) & kept);
         lower = (lower ^ y) & low;
     }
     // How many strata pass.
-    let whole = limits.threshold >> (32 - Fields::<N>::BITS);
+    let whole = limits.threshold >> (32 - bits);
     let part = lower.simd_lt(limits.threshold & low);
     let passing = part.select(whole + word(1), whole);
     let passing = limits.opaque.select(word(N as u32), passing);
-    // A field's upper bit is set where its stratum is not among them.
-    let beyond = (word(1 << (Fields::<N>::WIDTH - 1)) - passing) * word(Fields::<N>::ONES);
-    if N <= 8 {
-        return !(strata[0] + beyond) & word(all(N));
-    }
-    let mut hits = word(0);
-    for i in 0..Fields::<N>::WORDS {
-        let failed = (strata[i] + beyond) >> (Fields::<N>::WIDTH - 1 - i as u32);
-        hits |= !failed & word(Fields::<N>::ONES << i);
-    }
-    // Four bits of each byte side by side.
-    let hits = (hits | hits >> 4) & word(0x00ff_00ff);
-    (hits | hits >> 8) & word(0xffff)
+    // The upper bit of the four is set where a stratum is not among them.
+    let beyond = (word(8) - passing) * word(ONES);
+    !(strata + beyond) & word(all(N))
 }

@@ -25,7 +25,7 @@ pub enum Source {
 }
 
 /// A fragment for each of sixteen pixels. Sets of samples are packed (see
-/// [`bit`](crate::fast::abreast::bit)); a pixel that has none covers nothing.
+/// [`bit`](crate::fast::bit)); a pixel that has none covers nothing.
 #[derive(Clone, Copy)]
 pub struct Met<'a, S: Simd, const N: usize> {
     /// The round.
@@ -109,10 +109,10 @@ pub(super) fn words_of<S: Simd>(vector: u32x16<S>) -> [u32; 16] {
 pub struct Counted<S: Simd, P> {
     simd: S,
     sums: [u32x16<S>; 9],
-    /// Sorts by their length: four bits each, of 2 to 8 samples in the one, of 9 to 16 in the
-    /// other.
-    sorts: [u32x16<S>; 2],
-    sorts_in_bytes: [[u32x16<S>; 2]; 2],
+    /// Sorts by their length, from 2 to 8: four bits each.
+    sorts: u32x16<S>,
+    /// The same in bytes: of even lengths, and of odd ones.
+    sorts_in_bytes: [u32x16<S>; 2],
     rounds: u32,
     probe: PhantomData<P>,
 }
@@ -137,8 +137,8 @@ impl<S: Simd, P: Probe> Counted<S, P> {
         Counted {
             simd,
             sums: [none; 9],
-            sorts: [none; 2],
-            sorts_in_bytes: [[none; 2]; 2],
+            sorts: none,
+            sorts_in_bytes: [none; 2],
             rounds: 0,
             probe: PhantomData,
         }
@@ -204,20 +204,14 @@ impl<S: Simd, P: Probe> Counted<S, P> {
         self.add(Count::ColoursRead, counts);
     }
 
-    /// So many samples were sorted, up to 16.
+    /// So many samples were sorted, up to 8.
     #[inline(always)]
-    pub fn sorted<const N: usize>(&mut self, samples: u32x16<S>) {
-        if !P::LISTENS {
-            return;
-        }
-        let word = |word: u32| u32x16::splat(self.simd, word);
-        // Of lengths that a word has no place for, nothing is left.
-        let by = (samples - word(2)) << 2;
-        let add = |by: u32x16<S>| left_by(self.simd, word(1), by.min(word(32)));
-        self.sorts[0] += add(by);
-        if N > 8 {
-            // From 9 on.
-            self.sorts[1] += add(by - word(28));
+    pub fn sorted(&mut self, samples: u32x16<S>) {
+        if P::LISTENS {
+            let word = |word: u32| u32x16::splat(self.simd, word);
+            // Of fewer than 2, which is no sort, nothing is left in the word.
+            let by = ((samples - word(2)) << 2).min(word(32));
+            self.sorts += left_by(self.simd, word(1), by);
         }
     }
 
@@ -238,28 +232,21 @@ impl<S: Simd, P: Probe> Counted<S, P> {
     #[inline(always)]
     fn widen(&mut self) {
         let low = u32x16::splat(self.simd, 0x0f0f_0f0f);
-        for (narrow, [even, odd]) in self.sorts.iter_mut().zip(&mut self.sorts_in_bytes) {
-            *even += *narrow & low;
-            *odd += (*narrow >> 4) & low;
-            *narrow = u32x16::splat(self.simd, 0);
-        }
+        let [even, odd] = &mut self.sorts_in_bytes;
+        *even += self.sorts & low;
+        *odd += (self.sorts >> 4) & low;
+        self.sorts = u32x16::splat(self.simd, 0);
     }
 
     #[inline(never)]
     fn tell_sorts(&mut self, tally: &mut Tally<'_, P>) {
-        for (word, pair) in self.sorts_in_bytes.iter_mut().enumerate() {
-            for (odd, bytes) in pair.iter_mut().enumerate() {
-                for lane in words_of(*bytes) {
-                    for (place, byte) in lane.to_le_bytes().into_iter().enumerate() {
-                        let place = 2 * place + odd;
-                        // The first word's eighth is the second's first.
-                        if place < 7 || word == 1 {
-                            tally.sorts(7 * word + place + 2, u64::from(byte));
-                        }
-                    }
+        for (odd, bytes) in self.sorts_in_bytes.iter_mut().enumerate() {
+            for lane in words_of(*bytes) {
+                for (place, byte) in lane.to_le_bytes().into_iter().enumerate() {
+                    tally.sorts(2 * place + odd + 2, u64::from(byte));
                 }
-                *bytes = u32x16::splat(self.simd, 0);
             }
+            *bytes = u32x16::splat(self.simd, 0);
         }
     }
 

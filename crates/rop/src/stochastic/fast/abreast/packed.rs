@@ -1,28 +1,25 @@
 //! Sets of a pixel's samples, or of their numbers, and what they have in order: a word a pixel,
 //! sixteen pixels in a vector.
 //!
-//! Of up to 8 samples each has four bits of the word, of which a set uses the upper one: a rank
-//! fits, so that eight comparisons are added up at once. Of 16 each has one bit, and ranks
-//! are numbers of their own.
+//! Each of up to 8 samples has four bits of the word, of which a set uses the upper one: a rank
+//! fits, so that a comparison that moves one sample up and another down is one addition.
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, i32x16, mask32x16, u32x16};
 
 /// Bits between a sample and the next.
-pub const fn stride(samples: usize) -> u32 {
-    if samples <= 8 { 4 } else { 1 }
-}
+pub const STRIDE: u32 = 4;
 
 /// The bit of sample `i`, or of number `i`.
-pub const fn bit(samples: usize, i: usize) -> u32 {
-    if samples <= 8 { 8 << (4 * i) } else { 1 << i }
+pub const fn bit(i: usize) -> u32 {
+    8 << (STRIDE as usize * i)
 }
 
 /// All samples.
 pub(super) const fn all(samples: usize) -> u32 {
     let (mut bits, mut i) = (0, 0);
     while i < samples {
-        bits |= bit(samples, i);
+        bits |= bit(i);
         i += 1;
     }
     bits
@@ -30,10 +27,7 @@ pub(super) const fn all(samples: usize) -> u32 {
 
 /// A mask, one bit a sample, as a packed word.
 #[inline]
-pub(super) fn pack<const N: usize>(mask: u32) -> u32 {
-    if N > 8 {
-        return mask;
-    }
+pub(super) fn pack(mask: u32) -> u32 {
     let x = (mask | mask << 12) & 0x000f_000f;
     let x = (x | x << 6) & 0x0303_0303;
     ((x | x << 3) & 0x1111_1111) << 3
@@ -41,10 +35,7 @@ pub(super) fn pack<const N: usize>(mask: u32) -> u32 {
 
 /// The other way.
 #[inline]
-pub(super) fn unpack<const N: usize>(packed: u32) -> u32 {
-    if N > 8 {
-        return packed;
-    }
+pub(super) fn unpack(packed: u32) -> u32 {
     let x = packed >> 3 & 0x1111_1111;
     let x = (x | x >> 3) & 0x0303_0303;
     let x = (x | x >> 6) & 0x000f_000f;
@@ -55,9 +46,6 @@ pub(super) fn unpack<const N: usize>(packed: u32) -> u32 {
 #[inline(always)]
 pub(super) fn packed<S: Simd, const N: usize>(simd: S, mask: u32x16<S>) -> u32x16<S> {
     let word = |word: u32| u32x16::splat(simd, word);
-    if N > 8 {
-        return mask & word(all(N));
-    }
     let x = (mask | mask << 12) & word(0x000f_000f);
     let x = (x | x << 6) & word(0x0303_0303);
     ((x | x << 3) << 3) & word(all(N))
@@ -83,14 +71,9 @@ pub(super) fn count<S: Simd>(simd: S, set: u32x16<S>) -> u32x16<S> {
     simd.count_ones_u32x16(set)
 }
 
-/// The places of samples in an order, from 0.
+/// The places of up to 8 samples in an order, from 0: four bits each.
 #[derive(Clone, Copy)]
-pub enum Ranks<S: Simd, const N: usize> {
-    /// Up to 8: four bits each.
-    Word(u32x16<S>),
-    /// A word each.
-    Words([u32x16<S>; N]),
-}
+pub struct Ranks<S: Simd, const N: usize>(u32x16<S>);
 
 impl<S: Simd, const N: usize> Ranks<S, N> {
     /// The order of rising keys, of equal keys that of the samples; `after(i, j)` says whether
@@ -98,31 +81,17 @@ impl<S: Simd, const N: usize> Ranks<S, N> {
     #[inline(always)]
     pub fn by(simd: S, after: impl Fn(usize, usize) -> mask32x16<S>) -> Self {
         let word = |word: u32| u32x16::splat(simd, word);
-        if N <= 8 {
-            // As if none came after a later one. Two sums, so that an addition need not wait
-            // for the one before.
-            let mut sums = [word(0x7654_3210), word(0)];
-            for i in 0..N {
-                for j in i + 1..N {
-                    let move_up = word((1_u32 << (4 * i)).wrapping_sub(1 << (4 * j)));
-                    let sum = &mut sums[(i + j) % 2];
-                    *sum = after(i, j).select(*sum + move_up, *sum);
-                }
-            }
-            return Ranks::Word(sums[0] + sums[1]);
-        }
-        let mut ranks = [word(0); N];
-        for i in 0..N {
-            ranks[i] = word(i as u32);
-        }
+        // As if none came after a later one. Two sums, so that an addition need not wait for the
+        // one before.
+        let mut sums = [word(0x7654_3210), word(0)];
         for i in 0..N {
             for j in i + 1..N {
-                let after = after(i, j);
-                ranks[i] = after.select(ranks[i] + word(1), ranks[i]);
-                ranks[j] = after.select(ranks[j] - word(1), ranks[j]);
+                let move_up = word((1_u32 << (4 * i)).wrapping_sub(1 << (4 * j)));
+                let sum = &mut sums[(i + j) % 2];
+                *sum = after(i, j).select(*sum + move_up, *sum);
             }
         }
-        Ranks::Words(ranks)
+        Ranks(sums[0] + sums[1])
     }
 
     /// [`Ranks::by`] of signed keys.
@@ -138,16 +107,8 @@ impl<S: Simd, const N: usize> Ranks<S, N> {
     /// The order of the samples of a set as they stand.
     #[inline(always)]
     pub fn in_sample_order(simd: S, set: u32x16<S>) -> Self {
-        let word = |word: u32| u32x16::splat(simd, word);
-        if N <= 8 {
-            // Each sample's four bits become the sum of those below.
-            return Ranks::Word((set >> 3) * word(0x1111_1110));
-        }
-        let mut ranks = [word(0); N];
-        for i in 0..N {
-            ranks[i] = count(simd, set & word((1 << i) - 1));
-        }
-        Ranks::Words(ranks)
+        // Each sample's four bits become the sum of those below.
+        Ranks((set >> 3) * u32x16::splat(simd, 0x1111_1110))
     }
 
     /// For each sample whether it is among `among` and its number is among `hits`.
@@ -156,24 +117,13 @@ impl<S: Simd, const N: usize> Ranks<S, N> {
         let word = |word: u32| u32x16::splat(simd, word);
         let none = word(0);
         let mut picked = [none.simd_gt(none); N];
-        match self {
-            Ranks::Word(ranks) => {
-                // A rank takes three of its four bits: with the fourth set where a sample is not
-                // among them, its bit is shifted out of the word.
-                let ranks = (*ranks | word(0x8888_8888)) ^ among;
-                for i in 0..N {
-                    let by = if i == 0 { ranks << 2 } else { ranks >> (4 * i as u32 - 2) };
-                    let bit = left_by(simd, word(8), by & word(0x3c));
-                    picked[i] = (bit & hits).simd_gt(none);
-                }
-            }
-            Ranks::Words(ranks) => {
-                for i in 0..N {
-                    let bit = left_by(simd, word(1), ranks[i]);
-                    let mine = (among & word(1 << i)).simd_gt(none);
-                    picked[i] = (bit & hits).simd_gt(none) & mine;
-                }
-            }
+        // A rank takes three of its four bits: with the fourth set where a sample is not among
+        // them, its bit is shifted out of the word.
+        let ranks = (self.0 | word(0x8888_8888)) ^ among;
+        for i in 0..N {
+            let by = if i == 0 { ranks << 2 } else { ranks >> (4 * i as u32 - 2) };
+            let bit = left_by(simd, word(8), by & word(0x3c));
+            picked[i] = (bit & hits).simd_gt(none);
         }
         picked
     }

@@ -6,7 +6,7 @@ use fearless_simd::{Simd, i32x16, mask32x16, u32x16};
 use crate::contract::event::Probe;
 use crate::stochastic::fast::abreast::hits::Limits;
 use crate::stochastic::fast::abreast::met::{Abreast, Counted, Met, Source, gather, words_of};
-use crate::stochastic::fast::abreast::packed::{Ranks, bit, count, pack, right_by, stride, unpack};
+use crate::stochastic::fast::abreast::packed::{Ranks, STRIDE, bit, count, pack, right_by, unpack};
 use crate::stochastic::fast::references::FastReferences;
 use crate::stochastic::fast::tracked::{FastTracked, Rules, Switches, Track};
 use crate::stochastic::methods::Round;
@@ -100,7 +100,7 @@ impl<R: Rules, F: FastReferences<N>, const N: usize> Abreast<N> for FastTracked<
         };
         let none = u32x16::splat(simd, 0);
         let mut lanes = TrackLanes {
-            covered: gather(simd, pixels, |p| pack::<N>(kept[p].covered as u32)),
+            covered: gather(simd, pixels, |p| pack(kept[p].covered as u32)),
             surface: gather(simd, pixels, |p| kept[p].surface),
             reversed: gather(simd, pixels, |p| bases(p).reversed),
             moved: gather(simd, pixels, |p| bases(p).moved),
@@ -134,7 +134,7 @@ impl<R: Rules, F: FastReferences<N>, const N: usize> Abreast<N> for FastTracked<
             let to = &mut kept[usize::from(*pixel)];
             to.base = to.base.of_surface(surface[i].wrapping_sub(to.surface));
             to.surface = surface[i];
-            to.covered = u64::from(unpack::<N>(covered[i]));
+            to.covered = u64::from(unpack(covered[i]));
             if F::KEEPS {
                 to.kept = F::of_word(words[i], covered[i] != 0);
             }
@@ -181,7 +181,7 @@ impl<R: Rules, F: FastReferences<N>, const N: usize> Abreast<N> for FastTracked<
         counted.surfaces(starts);
         let count = count(simd, s);
         if sort {
-            counted.sorted::<N>(count);
+            counted.sorted(count);
         }
 
         // 10–17, the values in the order of the numbers.
@@ -224,7 +224,7 @@ fn keys_among<S: Simd, const N: usize>(simd: S, met: &Met<'_, S, N>) -> [i32x16<
     let (none, most) = (u32x16::splat(simd, 0), i32x16::splat(simd, i32::MAX));
     let mut keys = [most; N];
     for i in 0..N {
-        let covers = (met.coverage & u32x16::splat(simd, bit(N, i))).simd_gt(none);
+        let covers = (met.coverage & u32x16::splat(simd, bit(i))).simd_gt(none);
         keys[i] = covers.select(met.stored[i], most);
     }
     keys
@@ -240,10 +240,10 @@ fn prehashed<S: Simd>(simd: S, surface: u32x16<S>, seed: u32) -> u32x16<S> {
 
 /// Hits from the first number on.
 #[inline(always)]
-pub(in crate::stochastic::fast) fn from_first<S: Simd, const N: usize>(
+pub(in crate::stochastic::fast) fn from_first<S: Simd>(
     simd: S,
     hits: u32x16<S>,
     first: u32x16<S>,
 ) -> u32x16<S> {
-    right_by(simd, hits, first * u32x16::splat(simd, stride(N)))
+    right_by(simd, hits, first * u32x16::splat(simd, STRIDE))
 }
