@@ -15,7 +15,7 @@ pub(super) fn section(content: &Content<'_>) -> Markup {
         @if content.results.records.iter().all(|r| r.speed.values().all(|s| s.seconds.is_none())) {
             (nothing("Nothing was timed."))
         } @else { (figure("speed", &content.by_scene(|scene| speed(content, scene, &engines)), &html! {
-            "Fragments of the trace per second, from the file to the picture: medians, bars from quartile \
+            "Fragments of the trace per second, from the file, or from its fragments sorted by tile as another replay left them, to the picture: medians, bars from quartile \
              to quartile. "
             @for (engine, class) in engines.iter().zip(CLASSES) {
                 (swatch(class)) " " code { (engine) } " "

@@ -87,7 +87,7 @@ pub struct Measured {
 /// first, which finds caches cold and, on GPUs, programs that are not compiled.
 #[derive(Clone, Debug, Default)]
 pub struct Timed {
-    /// Seconds from the file to the picture.
+    /// Seconds from the file, or from its fragments as an earlier replay left them, to the picture.
     pub seconds: Vec<f64>,
     /// Seconds in which a GPU drew, by its own clock.
     pub kernel: Vec<f64>,

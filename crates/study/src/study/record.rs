@@ -223,7 +223,8 @@ pub struct SpectrumOverSeeds {
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Speed {
-    /// Seconds from the file to the picture, with so many [`threads`](Speed::threads); `None`
+    /// Seconds from the file, or from its fragments as an earlier replay left them, to the
+    /// picture, with so many [`threads`](Speed::threads); `None`
     /// where the engine cannot do it.
     pub seconds: Option<Spread>,
     /// Seconds in which a GPU draws, by its own clock.

@@ -73,7 +73,8 @@ pub struct Throughput {
     /// Bytes that must move at least: the stored columns once a pass, and the state of the
     /// touched tiles in and out once a pass.
     pub bytes: u64,
-    /// Seconds of a replay from the file to the picture.
+    /// Seconds of a replay to the picture: on a processor from the fragments that the first one
+    /// has left sorted by tile, where they fit into memory; else from the file.
     pub whole: Option<Spread>,
     /// Seconds in which a GPU draws, by its own clock.
     pub kernel: Option<Spread>,
