@@ -27,6 +27,7 @@ fn records() -> Vec<Record> {
     records[3].events.hashes = u64::MAX;
     let gpu = records[3].speed.get_mut("gpu").unwrap();
     gpu.kernel = Some(Spread { low: 1e-9, median: 2e-7, high: 0.3 });
+    gpu.threads = Some(1);
     let r = &mut records[4];
     (r.flip, r.flip_hdr, r.spectrum, r.covered.variance) = (None, None, None, None);
     r.filtered.clear();
