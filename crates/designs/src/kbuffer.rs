@@ -1,11 +1,14 @@
 //! The k-buffer (Bavoil, Callahan, Lefohn, Comba, Silva, I3D 2007): the nearest
 //! layers are kept in the order of their depths, what lies behind them is dropped.
 
+use fearless_simd::{Level, Simd, mask32x16};
+use screendoor_rop::fast::{Count, Width};
+use screendoor_rop::in_lanes::{self, Told};
 use screendoor_rop::layers::{COVERAGE, LAYERS, Layer, Layering};
 use screendoor_rop::shader;
 use screendoor_rop::{
-    Blueprint, Bounded, Eviction, Family, Frame, Info, OpaquePromise, OrderPromise, OverOpaque,
-    Port, Probe, Promises, colour, over_opaque,
+    Blueprint, Bounded, BoundedInLanes, EvictedLanes, Eviction, Family, Frame, Info, OpaquePromise,
+    OrderPromise, OverOpaque, Port, Probe, Promises, TiledDesign, colour, over_opaque,
 };
 use screendoor_trace::error::Result;
 use screendoor_trace::param::Values;
@@ -29,6 +32,17 @@ impl Blueprint for KBuffer {
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
         Ok(Bounded::over_opaque(values, frame))
+    }
+
+    fn fast<const N: usize>(
+        values: &Values,
+        frame: &Frame,
+        level: Level,
+    ) -> Result<Option<Box<dyn TiledDesign>>>
+    where
+        Count<N>: Width,
+    {
+        Ok(in_lanes::engine(Self::at::<N>(values, frame)?, level))
     }
 
     const PORTED: bool = true;
@@ -63,5 +77,14 @@ impl Eviction for Dropped {
         _probe: &mut P,
     ) -> bool {
         evicted != *new
+    }
+    #[inline(always)]
+    fn evict_lanes<S: Simd, P: Probe>(
+        _design: &BoundedInLanes<Self>,
+        _simd: S,
+        lanes: EvictedLanes<'_, S>,
+        _told: &mut Told<S, P>,
+    ) -> mask32x16<S> {
+        !lanes.same()
     }
 }

@@ -1,11 +1,14 @@
 //! Multi-layer alpha blending (Salvi, Vaidyanathan, I3D 2014): layers in the order
 //! of their depths; where there is one too many, the last two are merged.
 
+use fearless_simd::{Level, Simd, mask32x16};
+use screendoor_rop::fast::{Count, Width};
+use screendoor_rop::in_lanes::{self, Told};
 use screendoor_rop::layers::{COVERAGE, LAYERS, Layer, Layering};
 use screendoor_rop::shader;
 use screendoor_rop::{
-    Blueprint, Bounded, Eviction, Family, Frame, Info, OpaquePromise, OrderPromise, OverOpaque,
-    Port, Probe, Promises, colour, over_opaque,
+    Blueprint, Bounded, BoundedInLanes, EvictedLanes, Eviction, Family, Frame, Info, OpaquePromise,
+    OrderPromise, OverOpaque, Port, Probe, Promises, TiledDesign, colour, over_opaque,
 };
 use screendoor_trace::error::Result;
 use screendoor_trace::param::Values;
@@ -29,6 +32,17 @@ impl Blueprint for Mlab {
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
         Ok(Bounded::over_opaque(values, frame))
+    }
+
+    fn fast<const N: usize>(
+        values: &Values,
+        frame: &Frame,
+        level: Level,
+    ) -> Result<Option<Box<dyn TiledDesign>>>
+    where
+        Count<N>: Width,
+    {
+        Ok(in_lanes::engine(Self::at::<N>(values, frame)?, level))
     }
 
     const PORTED: bool = true;
@@ -70,6 +84,18 @@ impl Eviction for Merged {
             }
         }
         true
+    }
+
+    #[inline(always)]
+    fn evict_lanes<S: Simd, P: Probe>(
+        design: &BoundedInLanes<Self>,
+        simd: S,
+        lanes: EvictedLanes<'_, S>,
+        told: &mut Told<S, P>,
+    ) -> mask32x16<S> {
+        let of = lanes.of;
+        lanes.merge(design, simd, told);
+        of
     }
 }
 

@@ -5,6 +5,7 @@
 
 pub mod blended;
 pub mod contract;
+pub mod in_lanes;
 mod lanes;
 pub mod layered;
 mod replay;
@@ -45,6 +46,7 @@ pub use contract::words::{
     Constant, Declaration, Field, OnDevice, PixelWords, Ranks, TILE, TileWords,
 };
 pub use layered::bounded::{Bounded, Eviction};
+pub use layered::in_lanes::{BoundedInLanes, EvictedLanes, LayerLanes};
 pub use layered::normalise::{Normalise, VisibilitySums};
 pub use replay::{
     ExplainLimits, Explanation, Implementation, ReplayOptions, Replayed, Step, draw_pixel, explain,

@@ -1,5 +1,7 @@
 //! How wide colours are stored, the same for every design that stores any.
 
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x16, u32x16};
 use half::f16;
 
 use crate::contract::frame::Frame;
@@ -86,6 +88,18 @@ impl ColourStore {
         }
     }
 
+    /// [`ColourStore::channel`] of sixteen finite ones.
+    #[inline(always)]
+    pub fn channels<S: Simd>(self, simd: S, values: f32x16<S>) -> f32x16<S> {
+        match self.width {
+            ColourWidth::Unorm => {
+                (values.max(0.0).min(1.0) * 255.0 + f32x16::splat(simd, 0.5)).floor() / 255.0
+            }
+            ColourWidth::Half => as_halves(simd, values),
+            ColourWidth::Single | ColourWidth::Trace => values,
+        }
+    }
+
     /// A colour as it is stored.
     #[inline]
     pub fn colour(self, [r, g, b]: [f32; 3]) -> [f32; 3] {
@@ -111,6 +125,20 @@ fn as_half(value: f32) -> f32 {
     }
     // Subnormal ones are the multiples of 2^-24, as single precision has them from 1/2 to 1.
     ((value.abs() + 0.75) - 0.75).copysign(value)
+}
+
+/// [`as_half`] of sixteen finite numbers.
+#[inline(always)]
+fn as_halves<S: Simd>(simd: S, values: f32x16<S>) -> f32x16<S> {
+    let values = values.max(f16::MIN.to_f32_const()).min(f16::MAX.to_f32_const());
+    let word = |word: u32| u32x16::splat(simd, word);
+    let bits = values.bitcast::<u32x16<S>>();
+    let rounded = (bits + word(0xfff) + ((bits >> 13) & word(1))) & word(!0x1fff);
+    let size = values.abs();
+    let three_quarters = f32x16::splat(simd, 0.75);
+    let small = ((size + three_quarters) - three_quarters).copysign(values);
+    let normal = size.simd_ge(f32x16::splat(simd, f16::MIN_POSITIVE.to_f32_const()));
+    normal.select(rounded.bitcast::<f32x16<S>>(), small)
 }
 
 #[cfg(test)]

@@ -140,6 +140,45 @@ impl<T: Transparent<N>, const N: usize> OverOpaque<T, N> {
         32 + self.colour.colour_bits()
     }
 
+    /// The colour behind all that is drawn.
+    pub(crate) fn background(&self) -> [f32; 3] {
+        self.frame.background
+    }
+
+    /// [`Design::draw`], to the two parts of a pixel.
+    #[inline]
+    pub(crate) fn draw_parts<P: Probe>(
+        &self,
+        pass: u32,
+        site: Site,
+        (opaque, inner): (&mut Option<Box<Samples<N>>>, &mut T::Pixel),
+        fragment: &Fragment,
+        probe: &mut P,
+    ) {
+        if self.opaque == Opaque::Together {
+            return self.inner.draw(pass, site, inner, fragment, probe);
+        }
+        if let Some(coverage) = self.cull(pass, opaque, fragment, probe) {
+            let fragment = Fragment { coverage, ..*fragment };
+            self.inner.draw(pass - 1, site, inner, &fragment, probe);
+        }
+    }
+
+    /// [`Design::end_pass`], of the two parts of a pixel.
+    pub(crate) fn end_parts<P: Probe>(
+        &self,
+        pass: u32,
+        site: Site,
+        (opaque, inner): (&Option<Box<Samples<N>>>, &mut T::Pixel),
+        probe: &mut P,
+    ) {
+        if let Some(pass) = pass.checked_sub(self.own_passes()) {
+            self.inner.end_pass(pass, site, inner, probe);
+        } else if let Some(samples) = opaque {
+            self.inner.over(inner, &samples.colour);
+        }
+    }
+
     /// Where opaque fragments come first: the samples of a fragment that `inner` is to
     /// draw in this pass, if there are any. An opaque fragment is drawn here.
     #[inline]
@@ -176,6 +215,19 @@ impl<T: Transparent<N>, const N: usize> OverOpaque<T, N> {
         probe.written(passed);
         probe.state(0, self.sample_bits() * passed.count());
         None
+    }
+
+    /// [`Design::contents`], of the two parts of a pixel.
+    pub(crate) fn contents_of(
+        &self,
+        (opaque, inner): (&Option<Box<Samples<N>>>, &T::Pixel),
+    ) -> Contents {
+        let mut contents = self.inner.contents(inner);
+        if let Some(samples) = opaque {
+            let colour = box_filter(&samples.colour).map(|c| format!("{c:.3}")).join(" ");
+            contents.fields.insert(0, ("opaque", colour));
+        }
+        contents
     }
 }
 
@@ -214,21 +266,12 @@ impl<T: Transparent<N>, const N: usize> Design for OverOpaque<T, N> {
         fragment: &Fragment,
         probe: &mut P,
     ) {
-        if self.opaque == Opaque::Together {
-            return self.inner.draw(pass, site, &mut pixel.inner, fragment, probe);
-        }
-        if let Some(coverage) = self.cull(pass, &mut pixel.opaque, fragment, probe) {
-            let fragment = Fragment { coverage, ..*fragment };
-            self.inner.draw(pass - 1, site, &mut pixel.inner, &fragment, probe);
-        }
+        let parts = (&mut pixel.opaque, &mut pixel.inner);
+        self.draw_parts(pass, site, parts, fragment, probe);
     }
 
     fn end_pass<P: Probe>(&self, pass: u32, site: Site, pixel: &mut Self::Pixel, probe: &mut P) {
-        if let Some(pass) = pass.checked_sub(self.own_passes()) {
-            self.inner.end_pass(pass, site, &mut pixel.inner, probe);
-        } else if let Some(samples) = &pixel.opaque {
-            self.inner.over(&mut pixel.inner, &samples.colour);
-        }
+        self.end_parts(pass, site, (&pixel.opaque, &mut pixel.inner), probe);
     }
 
     fn resolve(&self, site: Site, pixel: &Self::Pixel) -> [f64; 3] {
@@ -239,12 +282,7 @@ impl<T: Transparent<N>, const N: usize> Design for OverOpaque<T, N> {
     }
 
     fn contents(&self, pixel: &Self::Pixel) -> Contents {
-        let mut contents = self.inner.contents(&pixel.inner);
-        if let Some(samples) = &pixel.opaque {
-            let colour = box_filter(&samples.colour).map(|c| format!("{c:.3}")).join(" ");
-            contents.fields.insert(0, ("opaque", colour));
-        }
-        contents
+        self.contents_of((&pixel.opaque, &pixel.inner))
     }
 
     fn bytes_per_fragment(&self) -> Option<usize> {

@@ -4,6 +4,7 @@
 use std::fmt::Debug;
 use std::marker::PhantomData;
 
+use fearless_simd::{Simd, mask32x16};
 use screendoor_trace::param::Values;
 use screendoor_trace::trace::Fragment;
 
@@ -13,6 +14,8 @@ use crate::contract::frame::{Frame, Site};
 use crate::contract::layout::Layout;
 use crate::contract::over_opaque::{self, OverOpaque, Transparent};
 use crate::contract::words::{Declaration, OnDevice, PixelWords};
+use crate::in_lanes::Told;
+use crate::layered::in_lanes::{BoundedInLanes, EvictedLanes};
 use crate::layered::layers::{Columns, Layer, Layering, contents};
 
 /// What becomes of the furthest of one layer too many.
@@ -26,12 +29,20 @@ pub trait Eviction: Clone + Copy + Debug + Send + Sync + 'static {
         evicted: Layer,
         probe: &mut P,
     ) -> bool;
+
+    /// The same of sixteen pixels.
+    fn evict_lanes<S: Simd, P: Probe>(
+        design: &BoundedInLanes<Self>,
+        simd: S,
+        lanes: EvictedLanes<'_, S>,
+        told: &mut Told<S, P>,
+    ) -> mask32x16<S>;
 }
 
 /// The design for pixels of `N` samples.
 #[derive(Clone, Debug)]
 pub struct Bounded<E, const N: usize> {
-    layering: Layering<N>,
+    pub(super) layering: Layering<N>,
     eviction: PhantomData<E>,
 }
 

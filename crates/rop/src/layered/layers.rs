@@ -42,7 +42,7 @@ pub const COVERAGE: Typed<Coverage> =
 /// The columns in which the layers of a pixel of `N` samples are composited.
 #[derive(Clone, Copy, Debug)]
 pub struct Columns<const N: usize> {
-    coverage: Coverage,
+    pub(super) coverage: Coverage,
     /// How layers store their colours, and one minus alpha beside them.
     pub store: ColourStore,
 }
