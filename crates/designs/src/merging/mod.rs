@@ -6,18 +6,22 @@
 //! What decides is arithmetic that any device has in the same bits: integers, and sums and
 //! products of single precision that are rounded one by one.
 
+mod lanes;
 mod sheet;
 #[cfg(test)]
 mod tests;
 
 use self::sheet::{Listed, Middles, SHARES, SLOPE_BITS, Sheet, Shown, slope};
+use fearless_simd::Level;
+use screendoor_rop::fast::{Count, Width};
+use screendoor_rop::in_lanes;
 use screendoor_rop::layers::{DEPTH_BITS, LAYERS, nearer, room};
 use screendoor_rop::shader;
 use screendoor_rop::view_depth::fraction;
 use screendoor_rop::{
     Blueprint, ColourStore, Contents, Declaration, Family, Frame, Info, Layout, OnDevice,
-    OpaquePromise, OrderPromise, OverOpaque, PixelWords, Port, Probe, Promises, Site, Transparent,
-    colour, over_opaque,
+    OpaquePromise, OrderPromise, OverOpaque, PixelWords, Port, Probe, Promises, Site, TiledDesign,
+    Transparent, colour, over_opaque,
 };
 use screendoor_trace::error::Result;
 use screendoor_trace::param::{Typed, Values};
@@ -65,6 +69,17 @@ impl Blueprint for Merging {
         Ok(OverOpaque::new(values, frame, over_opaque::of(values), inner))
     }
 
+    fn fast<const N: usize>(
+        values: &Values,
+        frame: &Frame,
+        level: Level,
+    ) -> Result<Option<Box<dyn TiledDesign>>>
+    where
+        Count<N>: Width,
+    {
+        Ok(in_lanes::engine(Self::at::<N>(values, frame)?, level))
+    }
+
     const PORTED: bool = true;
 
     fn port<const N: usize>(values: &Values, frame: &Frame) -> Result<Option<Port>> {
@@ -86,6 +101,13 @@ impl Blueprint for Merging {
 /// The design for pixels of `N` samples.
 #[derive(Clone, Debug)]
 pub struct MergingAt<const N: usize> {
+    rules: Rules,
+}
+
+/// The same, whatever the number of samples.
+#[derive(Clone, Debug)]
+struct Rules {
+    samples: usize,
     middles: Middles,
     seed: u32,
     store: ColourStore,
@@ -99,6 +121,13 @@ pub struct MergingAt<const N: usize> {
 
 impl<const N: usize> MergingAt<N> {
     fn of(values: &Values, frame: &Frame) -> Self {
+        MergingAt { rules: Rules::of(values, frame) }
+    }
+}
+
+impl Rules {
+    fn of(values: &Values, frame: &Frame) -> Self {
+        let samples = frame.positions.len();
         let store = ColourStore::of(values, frame);
         let slopes = values.get(SLOPES);
         let layout = Layout::of(
@@ -106,12 +135,13 @@ impl<const N: usize> MergingAt<N> {
             &[
                 (DEPTH_BITS, "depth"),
                 (if slopes { 2 * SLOPE_BITS } else { 0 }, "slopes"),
-                (N as u32, "coverage"),
+                (samples as u32, "coverage"),
                 (store.colour_bits(), "colour"),
                 (store.channel_bits(), "alpha"),
             ],
         );
-        MergingAt {
+        Rules {
+            samples,
             middles: Middles::of(frame.positions.clone()),
             seed: frame.seed,
             store,
@@ -165,7 +195,7 @@ impl<const N: usize> MergingAt<N> {
 
     /// Layers from near to far as a list.
     fn listed(&self, sheets: impl Iterator<Item = Sheet>) -> Vec<Listed> {
-        let mut list: Vec<Listed> = sheets.map(|sheet| Listed::of(sheet, N)).collect();
+        let mut list: Vec<Listed> = sheets.map(|sheet| Listed::of(sheet, self.samples)).collect();
         (0..list.len()).for_each(|i| Listed::link(&mut list, i));
         list
     }
@@ -173,7 +203,7 @@ impl<const N: usize> MergingAt<N> {
     /// Puts a layer into its place and looks at its neighbours: the place.
     fn put<P: Probe>(&self, list: &mut Vec<Listed>, sheet: Sheet, probe: &mut P) -> usize {
         let place = nearer(list, sheet.depth, probe);
-        list.insert(place, Listed::of(sheet, N));
+        list.insert(place, Listed::of(sheet, self.samples));
         // While there is room nobody asks what merging costs.
         if list.len() > self.room {
             Listed::link(list, place);
@@ -219,54 +249,25 @@ impl<const N: usize> MergingAt<N> {
         let i = Listed::cheapest(list);
         let merged = self.merged(&list[i].sheet, &list[i + 1].sheet, word);
         list.remove(i + 1);
-        list[i] = Listed::of(merged, N);
+        list[i] = Listed::of(merged, self.samples);
         Listed::settle(list, i);
         // All are read for their costs; written is each place that holds something else.
         let pairs = before.iter().zip(&*list);
         let written = pairs.filter(|(old, new)| old.sheet != new.sheet).count() as u32;
         probe.state((self.bits - DEPTH_BITS) * self.room as u32, self.bits * written);
     }
-}
-
-impl<const N: usize> Transparent<N> for MergingAt<N> {
-    /// From near to far.
-    type Pixel = Vec<Listed>;
-
-    fn layout(&self) -> Layout {
-        self.layout.clone()
-    }
-
-    fn clear(&self, _site: Site) -> Vec<Listed> {
-        Vec::new()
-    }
-
-    fn draw<P: Probe>(
+    /// The colour of a pixel, whose samples behind all layers are `behind`.
+    fn resolve<'a>(
         &self,
-        _pass: u32,
-        site: Site,
-        list: &mut Vec<Listed>,
-        fragment: &Fragment,
-        probe: &mut P,
-    ) {
-        let sheet = self.sheet(fragment);
-        let full = list.len() >= self.room;
-        let mut word = 0;
-        if full && self.place == Place::Random {
-            probe.hashed(1);
-            let pixel = u32::from(site.x) | u32::from(site.y) << 16;
-            word = hash([self.seed, pixel, fragment.primitive, sheet.depth.0]);
-        }
-        self.insert(list, sheet, word, probe);
-        probe.written(fragment.coverage);
-    }
-
-    fn resolve(&self, _site: Site, list: &Vec<Listed>, behind: &[[f32; 3]; N]) -> [f64; 3] {
+        sheets: impl Iterator<Item = &'a Sheet> + Clone,
+        behind: &[[f32; 3]],
+    ) -> [f64; 3] {
         let mut mean = [0.0; 3];
-        let mut order: Vec<(Unorm32, &Sheet)> = Vec::with_capacity(list.len());
+        let mut order: Vec<(Unorm32, &Sheet)> = Vec::new();
         for (s, behind) in behind.iter().enumerate() {
             let position = self.middles.position(s);
             order.clear();
-            for Listed { sheet, .. } in list.iter().filter(|l| l.sheet.coverage.contains(s)) {
+            for sheet in sheets.clone().filter(|sheet| sheet.coverage.contains(s)) {
                 // In order already but where planes cross.
                 let z = sheet.plane.at(position);
                 let mut place = order.len();
@@ -288,7 +289,44 @@ impl<const N: usize> Transparent<N> for MergingAt<N> {
             }
             add(*behind, through);
         }
-        mean.map(|sum| sum / N as f64)
+        mean.map(|sum| sum / self.samples as f64)
+    }
+}
+
+impl<const N: usize> Transparent<N> for MergingAt<N> {
+    /// From near to far.
+    type Pixel = Vec<Listed>;
+
+    fn layout(&self) -> Layout {
+        self.rules.layout.clone()
+    }
+
+    fn clear(&self, _site: Site) -> Vec<Listed> {
+        Vec::new()
+    }
+
+    fn draw<P: Probe>(
+        &self,
+        _pass: u32,
+        site: Site,
+        list: &mut Vec<Listed>,
+        fragment: &Fragment,
+        probe: &mut P,
+    ) {
+        let sheet = self.rules.sheet(fragment);
+        let full = list.len() >= self.rules.room;
+        let mut word = 0;
+        if full && self.rules.place == Place::Random {
+            probe.hashed(1);
+            let pixel = u32::from(site.x) | u32::from(site.y) << 16;
+            word = hash([self.rules.seed, pixel, fragment.primitive, sheet.depth.0]);
+        }
+        self.rules.insert(list, sheet, word, probe);
+        probe.written(fragment.coverage);
+    }
+
+    fn resolve(&self, _site: Site, list: &Vec<Listed>, behind: &[[f32; 3]; N]) -> [f64; 3] {
+        self.rules.resolve(list.iter().map(|l| &l.sheet), behind)
     }
 
     fn contents(&self, list: &Vec<Listed>) -> Contents {
@@ -304,7 +342,7 @@ impl<const N: usize> Transparent<N> for MergingAt<N> {
 
 impl<const N: usize> OnDevice<Vec<Listed>> for MergingAt<N> {
     fn declare(&self, to: &mut Declaration) {
-        let (room, samples) = (self.room as u32, N as u32);
+        let (room, samples) = (self.rules.room as u32, N as u32);
         to.field("SHEET_COUNT", 1);
         to.field("SHEET_PLANE", 3 * room);
         to.field("SHEET_DEPTH", room);
@@ -319,7 +357,7 @@ impl<const N: usize> OnDevice<Vec<Listed>> for MergingAt<N> {
         let words = |name: &str| from.field(name).collect::<Vec<u32>>();
         let [planes, depths, masks] = ["SHEET_PLANE", "SHEET_DEPTH", "SHEET_MASK"].map(words);
         let [colours, alphas] = ["SHEET_COLOUR", "SHEET_ALPHA"].map(words);
-        let width = masks.len() / self.room;
+        let width = masks.len() / self.rules.room;
         let sheet = |i: usize| {
             let mask = masks[i * width..(i + 1) * width].iter().rev();
             let coverage = SampleMask(mask.fold(0, |m, word| m << 32 | u64::from(*word)));
@@ -337,6 +375,6 @@ impl<const N: usize> OnDevice<Vec<Listed>> for MergingAt<N> {
             }
         };
         let sheets = (0..from.word("SHEET_COUNT") as usize).map(sheet);
-        self.listed(sheets)
+        self.rules.listed(sheets)
     }
 }

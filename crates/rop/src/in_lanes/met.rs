@@ -3,9 +3,8 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, i32x16, mask32x16, u32x4, u32x16};
 
+use crate::in_lanes::LANES;
 use crate::in_lanes::window::{ROOM, Row, Window};
-use crate::in_lanes::{LANES, Wide};
-use screendoor_trace::trace::{DepthPlane, Unorm32};
 
 /// A fragment of each of sixteen pixels; of a pixel that has none the coverage is empty.
 #[derive(Clone, Copy)]
@@ -45,57 +44,6 @@ impl<S: Simd> Met<S> {
             primitive: window.primitives(simd, numbers),
         }
     }
-}
-
-/// The depths of planes at offsets from the pixels' centres, in 1/16 pixel and at most half a
-/// pixel along each axis: [`DepthPlane::at`].
-#[inline(always)]
-pub fn depth_at<S: Simd>(
-    simd: S,
-    z: u32x16<S>,
-    [across, down]: [i32x16<S>; 2],
-    [x, y]: [i32x16<S>; 2],
-) -> u32x16<S> {
-    let word = |word: u32| u32x16::splat(simd, word);
-    let size = |x: i32x16<S>| x.abs().bitcast::<u32x16<S>>();
-    let (wide, high) = (size(across), size(down));
-    let reach = ((wide + high) >> 1) + word(1);
-    let steep = (wide | high).simd_ge(word(1 << 27)) | z.simd_lt(reach) | (z + reach).simd_lt(z);
-    if steep.any_true() {
-        return steep_at(simd, z, [across, down], [x, y]);
-    }
-    z + ((across * x + down * y) >> 4).bitcast::<u32x16<S>>()
-}
-
-/// The same, one by one.
-#[cold]
-#[inline(never)]
-fn steep_at<S: Simd>(
-    simd: S,
-    z: u32x16<S>,
-    slopes: [i32x16<S>; 2],
-    offset: [i32x16<S>; 2],
-) -> u32x16<S> {
-    let signed = |v: i32x16<S>| {
-        let mut list = [0; LANES];
-        v.store_slice(&mut list);
-        list
-    };
-    let mut depths = [0; LANES];
-    z.store_slice(&mut depths);
-    let ([across, down], [x, y]) = (slopes.map(signed), offset.map(signed));
-    for (i, depth) in depths.iter_mut().enumerate() {
-        let plane = DepthPlane { z: Unorm32(*depth), dzdx: across[i], dzdy: down[i] };
-        *depth = plane.at([x[i] as i8, y[i] as i8]).0;
-    }
-    u32x16::from_slice(simd, &depths)
-}
-
-/// In double precision.
-#[inline(always)]
-pub fn widened<S: Simd>(simd: S, x: f32x16<S>) -> Wide<S> {
-    let (low, high) = simd.widen_f32x16(x);
-    [low, high]
 }
 
 /// The first words of sixteen rows, the second ones, and so on.

@@ -13,6 +13,7 @@ mod engine;
 mod groups;
 mod kernel;
 mod met;
+mod numbers;
 mod told;
 mod window;
 
@@ -25,7 +26,8 @@ use crate::contract::over_opaque::Transparent;
 use screendoor_trace::tile::TILE_PIXELS;
 
 pub use engine::engine;
-pub use met::{Met, widened};
+pub use met::Met;
+pub use numbers::{depth_at, hashed, reaches_ends, widened, words};
 pub use told::Told;
 
 /// Pixels that are drawn side by side.

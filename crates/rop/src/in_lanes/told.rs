@@ -6,6 +6,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, mask32x16, u32x16};
 
 use crate::contract::event::{EventCounts, Probe};
+use crate::in_lanes::words;
 
 /// Counts what is done in lanes, if `P` listens: as [`Probe`], where the numbers are those of
 /// sixteen pixels.
@@ -97,11 +98,7 @@ impl<S: Simd, P: Probe> Told<S, P> {
 
     /// All that was counted.
     pub(super) fn events(&self) -> EventCounts {
-        let sum = |lanes: u32x16<S>| {
-            let mut words = [0; super::LANES];
-            lanes.store_slice(&mut words);
-            words.into_iter().map(u64::from).sum::<u64>()
-        };
+        let sum = |lanes| words(lanes).into_iter().map(u64::from).sum();
         EventCounts {
             fragments: sum(self.fragments),
             samples_written: sum(self.written),
