@@ -10,7 +10,7 @@ use screendoor_trace::tile::TileGrid;
 use screendoor_trace::trace::{BLOCK, Block, Fragment};
 
 /// Rows of a window, at most: with their lists they should lie in the second-level cache.
-pub(super) const MOST_ROWS: usize = 1 << 13;
+pub(super) const MOST_ROWS: usize = 1 << 14;
 
 /// A row that covers nothing.
 pub(super) const NOTHING: u16 = MOST_ROWS as u16;
