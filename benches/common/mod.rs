@@ -101,7 +101,7 @@ pub fn draw(
     let near = black_box(blocks.clone());
     let resolved = work != Work::Draw;
     let start = Instant::now();
-    if matches!(work, Work::Picture | Work::Count) && engine.passes() == 1 {
+    if matches!(work, Work::Picture | Work::Count) {
         let told = told(&mut events, work);
         let mut list = BlockList::new(&near);
         if let Some(pixels) = engine.picture(frame.grid, *tile, &mut list, told) {

@@ -119,10 +119,7 @@ fn run(
     for counts_too in [false, true] {
         let mut told = EventCounts::default();
         let listener = if counts_too { Listener::Counts(&mut told) } else { Listener::Nobody };
-        let found = match engine.passes() {
-            1 => engine.picture(grid, tile, &mut BlockList::new(&blocks), listener),
-            _ => None,
-        };
+        let found = engine.picture(grid, tile, &mut BlockList::new(&blocks), listener);
         if let Some(found) = found {
             let label = design.label();
             assert!(bits(&found) == colours, "{label} {implementation:?}: the picture");

@@ -46,7 +46,8 @@ pub use contract::words::{
     Constant, Declaration, Field, OnDevice, PixelWords, Ranks, TILE, TileWords,
 };
 pub use layered::bounded::{Bounded, Eviction};
-pub use layered::in_lanes::{BoundedInLanes, EvictedLanes, LayerLanes};
+pub use layered::in_lanes::{BoundedInLanes, EvictedLanes};
+pub use layered::lanes::{ColumnsInLanes, LayerLanes, ListLanes};
 pub use layered::normalise::{Normalise, VisibilitySums};
 pub use replay::{
     ExplainLimits, Explanation, Implementation, ReplayOptions, Replayed, Step, draw_pixel, explain,

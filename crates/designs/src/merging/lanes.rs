@@ -121,28 +121,33 @@ pub struct Lists<S: Simd> {
 
 /// The design in lanes.
 #[derive(Debug)]
-pub struct MergingInLanes(Rules);
+pub struct MergingInLanes {
+    rules: Rules,
+    /// Where samples lie.
+    places: Vec<[f32; 2]>,
+}
 
 impl<const N: usize> HasLanes<N> for MergingAt<N> {
     type InLanes = MergingInLanes;
 
     fn in_lanes(&self) -> Option<MergingInLanes> {
-        Some(MergingInLanes(self.rules.clone()))
+        let rules = self.rules.clone();
+        let place = |s| rules.middles.position(s).map(f32::from);
+        let places = (0..N).map(place).collect();
+        Some(MergingInLanes { rules, places })
     }
 }
 
-impl Rules {
+impl MergingInLanes {
     /// The middles of samples: [`Middles::of_samples`](super::Middles::of_samples).
     #[inline(always)]
     fn middles<S: Simd>(&self, simd: S, coverage: u32x16<S>) -> [i32x16<S>; 2] {
         let nought = f32x16::splat(simd, 0.0);
         let mut sums = [nought; 2];
-        for s in 0..self.samples {
+        for (s, place) in self.places.iter().enumerate() {
             let covers = (coverage & u32x16::splat(simd, 1 << s)).simd_ne(0);
-            let position = self.middles.position(s);
             for axis in 0..2 {
-                let place = f32x16::splat(simd, position[axis].into());
-                sums[axis] = covers.select(sums[axis] + place, sums[axis]);
+                sums[axis] = covers.select(sums[axis] + place[axis], sums[axis]);
             }
         }
         // Of small whole numbers: no quotient is rounded to the next whole one.
@@ -158,15 +163,15 @@ impl Rules {
         let mut slopes = [slope(simd, across), slope(simd, down)];
         let depth = depth_at(simd, met.z, slopes, self.middles(simd, met.coverage));
         let mut z = met.z;
-        if !self.slopes {
+        if !self.rules.slopes {
             z = depth;
             slopes = [i32x16::splat(simd, 0); 2];
         }
         let mut colour = met.colour;
         for c in 0..3 {
-            colour[c] = self.store.channels(simd, colour[c]);
+            colour[c] = self.rules.store.channels(simd, colour[c]);
         }
-        let alpha = self.store.channels(simd, met.alpha);
+        let alpha = self.rules.store.channels(simd, met.alpha);
         Sheets { z, slopes, depth, coverage: met.coverage, colour, alpha }
     }
 
@@ -176,7 +181,7 @@ impl Rules {
         let one = f32x16::splat(simd, 1.0);
         let Shown { near, far, covered, .. } = Shown::of(simd, a, b);
         let sum = near + far;
-        let first = match self.place {
+        let first = match self.rules.place {
             Place::Random => {
                 let part = f32x16::splat(simd, 1.0 / (1 << 24) as f32);
                 (simd.cvt_f32_u32x16(word >> 8) * part * sum).simd_lt(near)
@@ -190,9 +195,9 @@ impl Rules {
         for c in 0..3 {
             let mean = (a.colour[c] * near + b.colour[c] * far) / sum;
             let colour = shows.select(mean, a.colour[c]);
-            merged.colour[c] = self.store.channels(simd, colour);
+            merged.colour[c] = self.rules.store.channels(simd, colour);
         }
-        merged.alpha = self.store.channels(simd, (sum * (one / covered)).min(1.0));
+        merged.alpha = self.rules.store.channels(simd, (sum * (one / covered)).min(1.0));
         merged
     }
 
@@ -213,7 +218,7 @@ impl Rules {
             let better = cost.simd_lt(least);
             best = better.select(u32x16::splat(simd, i as u32), best);
             least = better.select(cost, least);
-            let opaque = a.alpha * (counted(simd, a.coverage) / self.samples as f32);
+            let opaque = a.alpha * (counted(simd, a.coverage) / self.rules.samples as f32);
             through = through * (f32x16::splat(simd, 1.0) - opaque);
         }
         best
@@ -254,14 +259,14 @@ impl MergingInLanes {
     #[inline(always)]
     fn merge<S: Simd>(&self, simd: S, of: mask32x16<S>, list: &mut [Sheets<S>], word: u32x16<S>) {
         let place = |i: usize| u32x16::splat(simd, i as u32);
-        let best = self.0.cheapest(simd, list);
+        let best = self.cheapest(simd, list);
         let [mut near, mut far] = [list[0], list[1]];
         for (i, pair) in list.windows(2).enumerate().skip(1) {
             let here = best.simd_eq(place(i));
             near = pair[0].or(here, &near);
             far = pair[1].or(here, &far);
         }
-        let merged = self.0.both(simd, &near, &far, word);
+        let merged = self.both(simd, &near, &far, word);
         // Both are taken out where they are, and what they became is put into its place.
         let best = of.select(best, place(list.len()));
         let none = Sheets::none(simd);
@@ -292,15 +297,15 @@ impl MergingInLanes {
         }
         told.compared(any, lists.held);
         told.state(any, lists.held * word(DEPTH_BITS), word(0));
-        let [rest, all] = [self.0.bits - DEPTH_BITS, self.0.bits].map(word);
+        let [rest, all] = [self.rules.bits - DEPTH_BITS, self.rules.bits].map(word);
         // What lies behind the new layer moves by one.
         let moved = lists.held - place;
         told.state(any & !full, rest * moved, all * (moved + word(1)));
         let merges = any & full;
-        let room = self.0.room as u32;
-        told.hashed(merges, u32::from(self.0.place == Place::Random));
+        let room = self.rules.room as u32;
+        told.hashed(merges, u32::from(self.rules.place == Place::Random));
         told.compared(merges, word(room - 1));
-        told.multiplied(merges, word(self.0.products(room)));
+        told.multiplied(merges, word(self.rules.products(room)));
         told.state(merges, rest * word(room), word(0));
     }
 }
@@ -310,7 +315,7 @@ impl InLanes for MergingInLanes {
     type Lanes<S: Simd> = Lists<S>;
 
     fn clear<S: Simd>(&self, simd: S) -> Lists<S> {
-        let sheets = vec![Sheets::none(simd); self.0.room + 1];
+        let sheets = vec![Sheets::none(simd); self.rules.room + 1];
         Lists { sheets, before: Vec::new(), held: u32x16::splat(simd, 0) }
     }
 
@@ -383,7 +388,7 @@ impl InLanes for MergingInLanes {
         let sheets: Vec<_> = lists.sheets.iter().map(sixteen).collect();
         for (lane, pixel) in pixels.iter().enumerate() {
             let list = sheets.iter().take(held[lane] as usize).map(|sheets| sheets[lane]);
-            states[usize::from(*pixel)] = self.0.listed(list);
+            states[usize::from(*pixel)] = self.rules.listed(list);
         }
     }
 
@@ -397,9 +402,9 @@ impl InLanes for MergingInLanes {
         told: &mut Told<S, P>,
     ) {
         let word = |word: u32| u32x16::splat(simd, word);
-        let new = self.0.sheets(simd, met);
+        let new = self.sheets(simd, met);
         let any = met.any;
-        let full = lists.held.simd_ge(word(self.0.room as u32));
+        let full = lists.held.simd_ge(word(self.rules.room as u32));
         if P::LISTENS {
             self.tell_put(simd, lists, &new, [any, full], told);
             lists.before.clone_from(&lists.sheets);
@@ -409,15 +414,15 @@ impl InLanes for MergingInLanes {
         let merges = any & full;
         if merges.any_true() {
             let mut chosen = word(0);
-            if self.0.place == Place::Random {
-                let seed = word(self.0.seed);
+            if self.rules.place == Place::Random {
+                let seed = word(self.rules.seed);
                 chosen = hashed(simd, [seed, met.pixel, met.primitive, new.depth]);
             }
             self.merge(simd, merges, &mut lists.sheets, chosen);
             if P::LISTENS {
                 // Written is each place that holds something else.
                 for (old, new) in lists.before.iter().zip(&lists.sheets) {
-                    told.state(merges & new.differ(old), word(0), word(self.0.bits));
+                    told.state(merges & new.differ(old), word(0), word(self.rules.bits));
                 }
             }
         }
@@ -434,14 +439,14 @@ impl InLanes for MergingInLanes {
         let nought = f64x8::splat(simd, 0.0);
         let mut sums = [[nought; 2]; 3];
         let mut crossing = lists.held.simd_lt(0);
-        let list = &lists.sheets[..self.0.room];
+        let list = &lists.sheets[..self.rules.room];
         let sheets: Vec<_> = list.iter().map(|sheets| Resolved::of(simd, sheets)).collect();
         for sheets in list {
             let covers = sheets.coverage.simd_ne(0);
             crossing |= covers & reaches_ends(simd, sheets.z, sheets.slopes);
         }
         for (s, behind) in behind.iter().enumerate() {
-            let [x, y] = self.0.middles.position(s).map(|p| i32x16::splat(simd, p.into()));
+            let [x, y] = self.rules.middles.position(s).map(|p| i32x16::splat(simd, p.into()));
             let mut last = u32x16::splat(simd, 0);
             let mut through = [f64x8::splat(simd, 1.0); 2];
             for (sheets, seen) in list.iter().zip(&sheets) {
@@ -469,7 +474,7 @@ impl InLanes for MergingInLanes {
         }
         for c in 0..3 {
             for half in 0..2 {
-                sums[c][half] = sums[c][half] / self.0.samples as f64;
+                sums[c][half] = sums[c][half] / self.rules.samples as f64;
             }
         }
         if crossing.any_true() {
@@ -530,7 +535,7 @@ impl MergingInLanes {
             let list = sheets.iter().take(held[lane] as usize).map(|sheets| &sheets[lane]);
             let behind: Vec<_> =
                 behind.iter().map(|b| b.map(|c| f32::from_bits(c[lane]))).collect();
-            let colour = self.0.resolve(list, &behind);
+            let colour = self.rules.resolve(list, &behind);
             for (sums, c) in sums.iter_mut().zip(colour) {
                 let half = &mut sums[lane / (LANES / 2)];
                 half.as_mut_slice()[lane % (LANES / 2)] = c;

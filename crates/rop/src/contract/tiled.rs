@@ -45,8 +45,8 @@ pub trait TiledDesign: Send + Sync {
         }
     }
     /// The colours of a tile of which `blocks` are all fragments, of an engine that finds them
-    /// without a state in memory: as of a cleared tile that they are drawn to. `None`, and no
-    /// block is taken, where it does not.
+    /// without a state in memory: as of a cleared tile that they are drawn to, in all passes.
+    /// `None`, and no block is taken, where it does not.
     fn picture(
         &self,
         _grid: TileGrid,

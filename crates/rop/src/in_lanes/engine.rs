@@ -1,6 +1,7 @@
 //! The engine of a design that has lanes.
 
 use std::cell::Cell;
+use std::ops::Range;
 
 use fearless_simd::Level;
 
@@ -128,10 +129,11 @@ impl<T: HasLanes<N> + 'static, const N: usize> Engine<T, N> {
         for_level!(self.level, simd => window.add(simd, block))
     }
 
-    fn drawing(&self, pass: u32, corner: [u32; 2]) -> Drawing<'_, T::InLanes> {
-        let own = self.plain.own_passes();
+    /// What draws these of the design's own passes.
+    fn drawing(&self, passes: Range<u32>, corner: [u32; 2]) -> Drawing<'_, T::InLanes> {
         // Where opaque fragments come first, who culls tells of each fragment.
-        Drawing { design: &self.lanes, pass: pass - own, corner, tells_fragments: own == 0 }
+        let tells_fragments = self.plain.own_passes() == 0;
+        Drawing { design: &self.lanes, passes, corner, tells_fragments }
     }
 
     fn draw_rows<P: Sum>(
@@ -142,7 +144,8 @@ impl<T: HasLanes<N> + 'static, const N: usize> Engine<T, N> {
         window: &mut Window,
         probe: &mut P,
     ) {
-        let drawing = self.drawing(pass, corner);
+        let pass = pass - self.plain.own_passes();
+        let drawing = self.drawing(pass..pass + 1, corner);
         for_level!(self.level, simd => drawing.draw(simd, states, window, probe))
     }
 
@@ -153,7 +156,7 @@ impl<T: HasLanes<N> + 'static, const N: usize> Engine<T, N> {
         bare: TilePixels,
         probe: &mut P,
     ) -> TilePixels {
-        let drawing = self.drawing(0, corner);
+        let drawing = self.drawing(0..self.plain.inner.passes(), corner);
         let behind = [self.plain.background(); N];
         for_level!(self.level, simd => drawing.picture(simd, window, &behind, bare, probe))
     }
@@ -246,7 +249,8 @@ impl<T: HasLanes<N> + 'static, const N: usize> TiledDesign for Engine<T, N> {
     ) -> Option<TilePixels> {
         let rows = blocks.rows();
         let fits = (LEAST_ROWS..=MOST_ROWS - BLOCK).contains(&rows);
-        if !fits || TiledDesign::passes(self) > 1 || matches!(listener, Listener::Record(_)) {
+        let opaque_first = self.plain.own_passes() > 0;
+        if !fits || opaque_first || matches!(listener, Listener::Record(_)) {
             return None;
         }
         let site = Site { x: 0, y: 0 };

@@ -1,5 +1,7 @@
 //! The loop over rounds.
 
+use std::ops::Range;
+
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, u32x16};
 
@@ -11,10 +13,10 @@ use screendoor_trace::picture::TilePixels;
 use screendoor_trace::tile::{TILE_PIXELS, TILE_SIDE};
 
 /// What is drawn to a tile.
-#[derive(Clone, Copy)]
 pub(super) struct Drawing<'a, D> {
     pub design: &'a D,
-    pub pass: u32,
+    /// The passes that are drawn, one after the other.
+    pub passes: Range<u32>,
     /// Column and row of the tile's first pixel.
     pub corner: [u32; 2],
     /// Whether fragments are told of here.
@@ -81,12 +83,14 @@ impl<D: InLanes> Drawing<'_, D> {
             *to = (self.corner[0] + x) | (self.corner[1] + y) << 16;
         }
         let pixel = u32x16::from_slice(simd, &pixel);
-        for numbers in group.rounds {
-            let met = Met::of(simd, window, numbers, pixel);
-            if self.tells_fragments {
-                told.fragments(met.any);
+        for pass in self.passes.clone() {
+            for numbers in group.rounds {
+                let met = Met::of(simd, window, numbers, pixel);
+                if self.tells_fragments {
+                    told.fragments(met.any);
+                }
+                self.design.draw(simd, lanes, pass, &met, &mut told);
             }
-            self.design.draw(simd, lanes, self.pass, &met, &mut told);
         }
         if P::LISTENS {
             probe.many(&told.events());

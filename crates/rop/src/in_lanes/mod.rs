@@ -39,7 +39,7 @@ pub const MOST_SAMPLES: usize = 32;
 /// Pixels' colours: each channel in two halves of eight lanes.
 pub type Wide<S> = [f64x8<S>; 2];
 
-/// A [`Transparent`] design that has lanes.
+/// A [`Transparent`] design that has lanes, and nothing to do at the ends of passes.
 pub trait HasLanes<const N: usize>: Transparent<N> {
     /// The same in lanes.
     type InLanes: InLanes<State = Self::Pixel>;

@@ -2,5 +2,6 @@
 
 pub(crate) mod bounded;
 pub(crate) mod in_lanes;
+pub mod lanes;
 pub mod layers;
 pub(crate) mod normalise;

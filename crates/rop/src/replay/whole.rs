@@ -116,7 +116,7 @@ fn draw_tile(
         if !blocks.any() {
             return (None, counts);
         }
-        if design.passes() == 1 {
+        if pass == 0 {
             let listener = counts.as_mut().map_or(Listener::Nobody, Listener::Counts);
             if let Some(pixels) = design.picture(frame.grid, tile, &mut blocks, listener) {
                 return (Some(pixels), counts);

@@ -12,12 +12,17 @@
 //! visibility, and a removed node's samples are joined to those of the node before
 //! it, over which their transmittance is averaged.
 
+mod lanes;
+
+use fearless_simd::Level;
+use screendoor_rop::fast::{Count, Width};
+use screendoor_rop::in_lanes;
 use screendoor_rop::layers::{
     COVERAGE, Columns, DEPTH_BITS, LAYERS, Layer, composite, contents, insert, nearer, room,
 };
 use screendoor_rop::{
     Blueprint, Contents, Family, Frame, Info, Layout, OpaquePromise, OrderPromise, OverOpaque,
-    Probe, Promises, Site, Transparent, colour, over_opaque,
+    Probe, Promises, Site, TiledDesign, Transparent, colour, over_opaque,
 };
 use screendoor_trace::error::Result;
 use screendoor_trace::param::Values;
@@ -41,6 +46,17 @@ impl Blueprint for Adaptive {
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
         let inner = AdaptiveAt { columns: Columns::of(values, frame), nodes: room(values) };
         Ok(OverOpaque::new(values, frame, over_opaque::of(values), inner))
+    }
+
+    fn fast<const N: usize>(
+        values: &Values,
+        frame: &Frame,
+        level: Level,
+    ) -> Result<Option<Box<dyn TiledDesign>>>
+    where
+        Count<N>: Width,
+    {
+        Ok(in_lanes::engine(Self::at::<N>(values, frame)?, level))
     }
 
     fn promises(values: &Values) -> Promises {
