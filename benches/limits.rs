@@ -1,6 +1,6 @@
 //! The table of `docs/PERFORMANCE.md`: how near the replay comes to the machine's limits.
 //!
-//! `cargo bench --bench limits` prints it as Markdown, in a quarter of a minute; with `-- --large`
+//! `cargo bench --bench limits` prints it as Markdown, in two minutes; with `-- --large`
 //! a trace of 10^8 fragments is written (3.3 GB, beside the build) and replayed, too.
 //!
 //! Machines are shared and change their speed while one looks. So every row is a ratio, its
@@ -20,27 +20,40 @@ use screendoor::design::{Configured, REFERENCE, configure};
 use screendoor::rop::{Frame, Implementation, ReplayOptions, TiledDesign};
 use screendoor::trace::{Trace, TraceWriter, WriteOptions};
 
+/// Designs beside those that have rows of their own, whose engines draw many fragments of a tile
+/// at once.
+const OTHERS: [&str; 5] = ["kbuffer", "wboit", "adaptive", "hashed-alpha", "mboit"];
+
 /// Measurements of every row; with `--test`, one.
 const ROUNDS: usize = 9;
 
 /// A row of the table.
-struct Row {
-    what: &'static str,
+struct Row<'a> {
+    what: String,
     least: f64,
+    /// Where it lies below `least`, the figure is a cost.
     aim: f64,
     unit: &'static str,
-    /// Whether the figure is a cost: the aim lies below.
-    lower: bool,
+    measure: Box<dyn Fn() -> f64 + 'a>,
     found: Vec<f64>,
 }
 
-impl Row {
+impl<'a> Row<'a> {
+    fn new(
+        what: impl Into<String>,
+        [least, aim]: [f64; 2],
+        unit: &'static str,
+        measure: impl Fn() -> f64 + 'a,
+    ) -> Self {
+        Row { what: what.into(), least, aim, unit, measure: Box::new(measure), found: Vec::new() }
+    }
+
     fn print(mut self) {
-        let Row { what, least, aim, unit, lower, .. } = self;
+        let Row { what, least, aim, unit, .. } = self;
         self.found.sort_by(f64::total_cmp);
         let at = |share: f64| self.found[((self.found.len() - 1) as f64 * share).round() as usize];
         let [low, median, high] = [0.25, 0.5, 0.75].map(at);
-        let held = |limit: f64| if lower { median <= limit } else { median >= limit };
+        let held = |limit: f64| if aim < least { median <= limit } else { median >= limit };
         let verdict = match (held(aim), held(least)) {
             (true, _) => "aim reached",
             (false, true) => "held",
@@ -134,77 +147,111 @@ fn main() {
     let (lk, lk_64) = (kernel("lk", 8), kernel("lk", 64));
     let (systematic, enderton) = (kernel("systematic", 8), kernel("enderton", 8));
     let exact = kernel(REFERENCE, 8);
-    let others = ["builtin:smoke", "builtin:glass"].map(|scene| captured(scene, 512));
-    let [smoke, glass] = others.each_ref().map(|trace| Kernel::new(trace, "lk", 8));
+    let scenes = ["builtin:smoke", "builtin:glass"].map(|scene| captured(scene, 512));
+    let [smoke, glass] = scenes.each_ref().map(|trace| Kernel::new(trace, "lk", 8));
     let words = common::stream();
     let (one, two) = (pool(1), pool(2));
     let file = std::fs::metadata(&path).expect("it has been written").len();
 
-    let mut found: [Vec<f64>; 15] = Default::default();
+    let rate = |kernel: &Kernel| kernel.fragments as f64 / kernel.time(Work::Picture) / 1e6;
+    // Samples in lanes against pixels in lanes.
+    let gained = |kernel: &Kernel| kernel.time(Work::Blocks) / kernel.time(Work::Picture);
+    let over_reference =
+        |kernel: &Kernel| kernel.reference_time(Work::Picture) / kernel.time(Work::Picture);
+    let per_sample = |kernel: &Kernel, samples: usize| {
+        kernel.time(Work::Picture) / (kernel.fragments * samples) as f64
+    };
+    let of_lk = |kernel: &Kernel| lk.time(Work::Picture) / kernel.time(Work::Picture);
+    let (mlab, merging) = (&kernel("mlab", 8), &kernel("merging", 8));
+    let residual = kernel("residual", 8);
+    let others = OTHERS.map(|name| (name, kernel(name, 8)));
+    let mut rows = vec![
+        Row::new(
+            "`lk`, 8 samples, kernel, one core: fast ÷ reference",
+            [12.0, 18.0],
+            "×",
+            || over_reference(&lk),
+        ),
+        Row::new(
+            "million fragments/s per core, `lk`, 8 samples, kernel: engine",
+            [100.0, 140.0],
+            "",
+            || rate(&lk),
+        ),
+        Row::new("the same: smoke", [100.0, 140.0], "", || rate(&smoke)),
+        Row::new("the same: glass", [70.0, 90.0], "", || rate(&glass)),
+        Row::new("`systematic`, 8 samples, kernel ÷ `lk` kernel", [0.8, 1.0], "×", || {
+            of_lk(&systematic)
+        }),
+        Row::new("`enderton`, the same", [0.8, 1.0], "×", || of_lk(&enderton)),
+        Row::new("`residual`, the same", [0.5, 0.7], "×", || of_lk(&residual)),
+        Row::new(
+            "`merging`, 8 samples, kernel ÷ the plain text of `mlab`",
+            [1.0, 2.0],
+            "×",
+            || mlab.reference_time(Work::Picture) / merging.time(Work::Picture),
+        ),
+        Row::new("`merging`, 8 samples, kernel ÷ `mlab` kernel", [1.0, 1.0], "×", || {
+            mlab.time(Work::Picture) / merging.time(Work::Picture)
+        }),
+        Row::new(
+            "pixels in lanes ÷ samples in lanes, `lk`, 8 samples: engine",
+            [1.5, 2.2],
+            "×",
+            || gained(&lk),
+        ),
+        Row::new("the same: smoke", [1.5, 2.2], "×", || gained(&smoke)),
+        Row::new("the same: glass", [1.5, 2.2], "×", || gained(&glass)),
+        Row::new("counting events: on ÷ off", [1.08, 1.02], "×", || {
+            lk.time(Work::Count) / lk.time(Work::Picture)
+        }),
+        Row::new("time per sample at 64 samples ÷ at 8", [1.5, 1.0], "×", || {
+            per_sample(&lk_64, 64) / per_sample(&lk, 8)
+        }),
+        Row::new("`exact` ÷ a per-pixel `Vec`, standard sort", [5.0, 6.0], "×", || {
+            over_reference(&exact)
+        }),
+        Row::new("second replay of a trace ÷ first, one thread", [2.0, 3.0], "×", || {
+            let first = replay(&trace, &one, false);
+            // One fills, the next finds.
+            replay(&trace, &one, true);
+            first / replay(&trace, &one, true)
+        }),
+        Row::new("two threads ÷ one, first replay", [1.85, 1.95], "×", || {
+            replay(&trace, &one, false) / replay(&trace, &two, false)
+        }),
+        Row::new(
+            "bytes of the file per second ÷ streaming, first replay, one thread",
+            [10.0, 20.0],
+            " %",
+            || {
+                let first = replay(&trace, &one, false);
+                let sum = || drop(black_box(common::sum(&words)));
+                let streamed = size_of_val(&words[..]) as f64 / seconds(sum);
+                100.0 * file as f64 / first / streamed
+            },
+        ),
+    ];
+    let named = [("mlab", mlab), ("merging", merging)];
+    for (name, kernel) in named.into_iter().chain(others.iter().map(|(name, k)| (*name, k))) {
+        let what = format!("`{name}`, 8 samples, kernel: fast ÷ reference");
+        rows.push(Row::new(what, [2.0, 4.0], "×", move || over_reference(kernel)));
+    }
     for _ in 0..rounds {
-        let time = lk.time(Work::Picture);
-        let rate = |kernel: &Kernel, time: f64| kernel.fragments as f64 / time / 1e6;
-        let first = replay(&trace, &one, false);
-        let on_two = replay(&trace, &two, false);
-        // One fills, the next finds.
-        replay(&trace, &one, true);
-        let second = replay(&trace, &one, true);
-        let streamed = size_of_val(&words[..]) as f64
-            / seconds(|| {
-                black_box(common::sum(&words));
-            });
-        let per_sample =
-            |kernel: &Kernel, time: f64, samples: usize| time / (kernel.fragments * samples) as f64;
-        // Samples in lanes against pixels in lanes.
-        let gained = |kernel: &Kernel| kernel.time(Work::Blocks) / kernel.time(Work::Picture);
-        let round = [
-            lk.reference_time(Work::Picture) / time,
-            rate(&lk, time),
-            rate(&smoke, smoke.time(Work::Picture)),
-            rate(&glass, glass.time(Work::Picture)),
-            lk.time(Work::Picture) / systematic.time(Work::Picture),
-            lk.time(Work::Picture) / enderton.time(Work::Picture),
-            gained(&lk),
-            gained(&smoke),
-            gained(&glass),
-            lk.time(Work::Count) / lk.time(Work::Picture),
-            per_sample(&lk_64, lk_64.time(Work::Picture), 64) / per_sample(&lk, time, 8),
-            exact.reference_time(Work::Picture) / exact.time(Work::Picture),
-            first / second,
-            first / on_two,
-            100.0 * file as f64 / first / streamed,
-        ];
-        for (list, figure) in found.iter_mut().zip(round) {
-            list.push(figure);
+        for row in &mut rows {
+            row.found.push((row.measure)());
         }
     }
     println!("| what | at least | aim | median (quartiles) | |");
     println!("|---|---|---|---|---|");
-    let rows = [
-        ("`lk`, 8 samples, kernel, one core: fast ÷ reference", 12.0, 18.0, "×"),
-        ("million fragments/s per core, `lk`, 8 samples, kernel: engine", 100.0, 140.0, ""),
-        ("the same: smoke", 100.0, 140.0, ""),
-        ("the same: glass", 70.0, 90.0, ""),
-        ("`systematic`, 8 samples, kernel ÷ `lk` kernel", 0.8, 1.0, "×"),
-        ("`enderton`, 8 samples, kernel ÷ `lk` kernel", 0.8, 1.0, "×"),
-        ("pixels in lanes ÷ samples in lanes, `lk`, 8 samples: engine", 1.5, 2.2, "×"),
-        ("the same: smoke", 1.5, 2.2, "×"),
-        ("the same: glass", 1.5, 2.2, "×"),
-        ("counting events: on ÷ off", 1.08, 1.02, "×"),
-        ("time per sample at 64 samples ÷ at 8", 1.5, 1.0, "×"),
-        ("`exact` ÷ a per-pixel `Vec`, standard sort", 5.0, 6.0, "×"),
-        ("second replay of a trace ÷ first, one thread", 2.0, 3.0, "×"),
-        ("two threads ÷ one, first replay", 1.85, 1.95, "×"),
-        ("bytes of the file per second ÷ streaming, first replay, one thread", 10.0, 20.0, " %"),
-    ];
-    for ((what, least, aim, unit), found) in rows.into_iter().zip(found) {
-        Row { what, least, aim, unit, lower: aim < least, found }.print();
-    }
+    rows.into_iter().for_each(Row::print);
     if asked("--large") {
         let (short, long) = (layers(folder.path(), 1), layers(folder.path(), 100));
         let per_fragment = |trace: &Trace| replay(trace, &two, false) / trace.rows() as f64;
-        let found = (0..3).map(|_| per_fragment(&long) / per_fragment(&short)).collect();
         let what = "time per fragment at 10^8 fragments ÷ at 10^6";
-        Row { what, least: 1.1, aim: 1.0, unit: "×", lower: true, found }.print();
+        let mut row =
+            Row::new(what, [1.1, 1.0], "×", || per_fragment(&long) / per_fragment(&short));
+        row.found = (0..3).map(|_| (row.measure)()).collect();
+        row.print();
     }
 }
