@@ -124,7 +124,7 @@ impl AdaptiveInLanes {
         let full = met.any & list.held.simd_ge(word(self.nodes as u32));
         list.held = (met.any & !full).select(list.held + word(1), list.held);
         if full.any_true() {
-            self.remove_least(simd, full, &mut list.layers);
+            self.remove_least(simd, full, list.used_mut());
             told.compared(full, word(self.nodes.max(2) as u32 - 2));
             // All are read; those from the removed one on move back.
             let bits = word(self.node_bits * self.nodes as u32);
@@ -148,7 +148,7 @@ impl AdaptiveInLanes {
         for column in 0..self.columns.count() {
             let bit = u32x16::splat(simd, 1 << column);
             let mut passes = [f64x8::splat(simd, 1.0); 2];
-            for node in &list.layers {
+            for node in list.used() {
                 let hides = (node.coverage & bit).simd_ne(0) & node.depth.simd_lt(met.z);
                 let wide = widened(simd, hides.select(node.transmittance, one));
                 for half in 0..2 {
@@ -245,7 +245,7 @@ impl InLanes for AdaptiveInLanes {
         pixels: &Pixels<S>,
         behind: &[[f32x16<S>; 3]],
     ) -> [Wide<S>; 3] {
-        let mut colours = self.columns.over(simd, &pixels.nodes.layers, behind);
+        let mut colours = self.columns.over(simd, pixels.nodes.used(), behind);
         for c in 0..3 {
             let own = widened(simd, pixels.colour[c]);
             for half in 0..2 {

@@ -114,6 +114,8 @@ fn squared<S: Simd>(x: f32x16<S>) -> f32x16<S> {
 pub struct Lists<S: Simd> {
     /// From near to far, and room for one more.
     sheets: Vec<Sheets<S>>,
+    /// How many of them are there in any of the pixels, at most.
+    used: usize,
     /// What they were before the last fragment, where somebody asks.
     before: Vec<Sheets<S>>,
     held: u32x16<S>,
@@ -292,7 +294,7 @@ impl MergingInLanes {
     ) {
         let word = |word: u32| u32x16::splat(simd, word);
         let mut place = word(0);
-        for sheets in &lists.sheets {
+        for sheets in &lists.sheets[..lists.used] {
             place = sheets.depth.simd_lt(new.depth).select(place + word(1), place);
         }
         told.compared(any, lists.held);
@@ -316,12 +318,13 @@ impl InLanes for MergingInLanes {
 
     fn clear<S: Simd>(&self, simd: S) -> Lists<S> {
         let sheets = vec![Sheets::none(simd); self.rules.room + 1];
-        Lists { sheets, before: Vec::new(), held: u32x16::splat(simd, 0) }
+        Lists { sheets, used: 0, before: Vec::new(), held: u32x16::splat(simd, 0) }
     }
 
     #[inline(always)]
     fn clear_again<S: Simd>(&self, simd: S, lists: &mut Lists<S>) {
-        lists.sheets.fill(Sheets::none(simd));
+        lists.sheets[..lists.used].fill(Sheets::none(simd));
+        lists.used = 0;
         lists.held = u32x16::splat(simd, 0);
     }
 
@@ -337,8 +340,10 @@ impl InLanes for MergingInLanes {
         for (held, pixel) in held.iter_mut().zip(pixels) {
             *held = states[usize::from(*pixel)].len() as u32;
         }
+        self.clear_again(simd, lists);
         lists.held = u32x16::from_slice(simd, &held);
-        for (i, to) in lists.sheets.iter_mut().enumerate() {
+        lists.used = held.into_iter().max().unwrap_or_default() as usize;
+        for (i, to) in lists.sheets[..lists.used].iter_mut().enumerate() {
             let mut columns = [[0_u32; LANES]; 9];
             for depth in [0, 3] {
                 columns[depth] = [u32::MAX; LANES];
@@ -385,7 +390,7 @@ impl InLanes for MergingInLanes {
         pixels: &[u8; LANES],
     ) {
         let held = words(lists.held);
-        let sheets: Vec<_> = lists.sheets.iter().map(sixteen).collect();
+        let sheets: Vec<_> = lists.sheets[..lists.used].iter().map(sixteen).collect();
         for (lane, pixel) in pixels.iter().enumerate() {
             let list = sheets.iter().take(held[lane] as usize).map(|sheets| sheets[lane]);
             states[usize::from(*pixel)] = self.rules.listed(list);
@@ -409,7 +414,9 @@ impl InLanes for MergingInLanes {
             self.tell_put(simd, lists, &new, [any, full], told);
             lists.before.clone_from(&lists.sheets);
         }
-        Self::insert(&new, any, &mut lists.sheets);
+        // The next that is not there takes what moves out.
+        lists.used = (lists.used + 1).min(lists.sheets.len());
+        Self::insert(&new, any, &mut lists.sheets[..lists.used]);
         lists.held = (any & !full).select(lists.held + word(1), lists.held);
         let merges = any & full;
         if merges.any_true() {
@@ -439,7 +446,7 @@ impl InLanes for MergingInLanes {
         let nought = f64x8::splat(simd, 0.0);
         let mut sums = [[nought; 2]; 3];
         let mut crossing = lists.held.simd_lt(0);
-        let list = &lists.sheets[..self.rules.room];
+        let list = &lists.sheets[..lists.used.min(self.rules.room)];
         let sheets: Vec<_> = list.iter().map(|sheets| Resolved::of(simd, sheets)).collect();
         for sheets in list {
             let covers = sheets.coverage.simd_ne(0);
@@ -529,7 +536,7 @@ impl MergingInLanes {
         sums: &mut [Wide<S>; 3],
     ) {
         let held = words(lists.held);
-        let sheets: Vec<_> = lists.sheets.iter().map(sixteen).collect();
+        let sheets: Vec<_> = lists.sheets[..lists.used].iter().map(sixteen).collect();
         let behind: Vec<_> = behind.iter().map(|b| b.map(|c| words(c.bitcast()))).collect();
         for lane in SampleMask(crossing).iter() {
             let list = sheets.iter().take(held[lane] as usize).map(|sheets| &sheets[lane]);

@@ -98,7 +98,7 @@ impl<E: Eviction> InLanes for BoundedInLanes<E> {
         list.held = (met.any & !full).select(list.held + word(1), list.held);
         let mut written = met.any;
         if evicts.any_true()
-            && let Some(last) = list.layers.last_mut()
+            && let Some(last) = list.used_mut().last_mut()
         {
             let lanes = EvictedLanes { last, new: &new, evicted, of: evicts };
             written = (met.any & !full) | (E::evict_lanes(self, simd, lanes, told) & evicts);
@@ -113,7 +113,7 @@ impl<E: Eviction> InLanes for BoundedInLanes<E> {
         list: &ListLanes<S>,
         behind: &[[f32x16<S>; 3]],
     ) -> [Wide<S>; 3] {
-        self.columns.over(simd, &list.layers, behind)
+        self.columns.over(simd, list.used(), behind)
     }
 }
 

@@ -93,7 +93,9 @@ fn counted<S: Simd>(simd: S, sets: u32x16<S>) -> f32x16<S> {
 #[derive(Clone)]
 pub struct ListLanes<S: Simd> {
     /// As many as there is room for.
-    pub layers: Vec<LayerLanes<S>>,
+    layers: Vec<LayerLanes<S>>,
+    /// How many of them are there in any of the pixels, at most.
+    used: usize,
     /// How many of them are there.
     pub held: u32x16<S>,
 }
@@ -101,14 +103,28 @@ pub struct ListLanes<S: Simd> {
 impl<S: Simd> ListLanes<S> {
     /// Empty lists.
     pub fn new(simd: S, room: usize) -> Self {
-        ListLanes { layers: vec![LayerLanes::none(simd); room], held: u32x16::splat(simd, 0) }
+        let layers = vec![LayerLanes::none(simd); room];
+        ListLanes { layers, used: 0, held: u32x16::splat(simd, 0) }
     }
 
     /// Empties them.
     #[inline(always)]
     pub fn clear(&mut self, simd: S) {
-        self.layers.fill(LayerLanes::none(simd));
+        self.used_mut().fill(LayerLanes::none(simd));
+        self.used = 0;
         self.held = u32x16::splat(simd, 0);
+    }
+
+    /// The layers that are there in any of the pixels, near ones first.
+    #[inline(always)]
+    pub fn used(&self) -> &[LayerLanes<S>] {
+        &self.layers[..self.used]
+    }
+
+    /// The same, to change.
+    #[inline(always)]
+    pub fn used_mut(&mut self) -> &mut [LayerLanes<S>] {
+        &mut self.layers[..self.used]
     }
 
     /// Takes pixels' lists in.
@@ -123,8 +139,10 @@ impl<S: Simd> ListLanes<S> {
         for (held, pixel) in held.iter_mut().zip(pixels) {
             *held = list_of(usize::from(*pixel)).len() as u32;
         }
+        self.clear(simd);
         self.held = u32x16::from_slice(simd, &held);
-        for (i, to) in self.layers.iter_mut().enumerate() {
+        self.used = held.into_iter().max().unwrap_or_default() as usize;
+        for (i, to) in self.used_mut().iter_mut().enumerate() {
             let mut words = [[u32::MAX; LANES], [0; LANES]];
             let mut reals = [[0.0; LANES], [0.0; LANES], [0.0; LANES], [1.0; LANES]];
             for (lane, pixel) in pixels.iter().enumerate() {
@@ -147,7 +165,7 @@ impl<S: Simd> ListLanes<S> {
     pub fn store(&self, pixels: &[u8; LANES], mut give: impl FnMut(usize, Vec<Layer>)) {
         let held = words(self.held);
         let mut lists = held.map(|held| Vec::with_capacity(held as usize));
-        for (i, layer) in self.layers.iter().enumerate() {
+        for (i, layer) in self.used().iter().enumerate() {
             let [depth, coverage] = [layer.depth, layer.coverage].map(words);
             let [r, g, b] = layer.colour;
             let reals = [r, g, b, layer.transmittance].map(|v| words(v.bitcast()));
@@ -171,8 +189,10 @@ impl<S: Simd> ListLanes<S> {
     /// others.
     #[inline(always)]
     pub fn insert(&mut self, new: LayerLanes<S>, any: mask32x16<S>) -> LayerLanes<S> {
+        // The next that is not there takes what would come out.
+        self.used = (self.used + 1).min(self.layers.len());
         let mut carried = new;
-        for layer in &mut self.layers {
+        for layer in self.used_mut() {
             // Those behind it all move by one, and so do those that are not there.
             let moves = !layer.depth.simd_lt(new.depth) & any;
             let moved = layer.or(moves, carried);
@@ -206,7 +226,7 @@ impl<S: Simd> ListLanes<S> {
         self.tell_nearer(simd, any, told);
         let word = |word: u32| u32x16::splat(simd, word);
         let mut place = word(0);
-        for layer in &self.layers {
+        for layer in self.used() {
             place = layer.depth.simd_lt(new.depth).select(place + word(1), place);
         }
         let moved = self.held - place;
