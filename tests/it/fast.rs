@@ -191,6 +191,11 @@ fn enderton_is_its_plain_text() {
 }
 
 #[test]
+fn hashed_alpha_is_its_plain_text() {
+    check_counts("hashed-alpha");
+}
+
+#[test]
 fn exact_is_its_plain_text() {
     check_counts("exact");
 }
@@ -201,7 +206,7 @@ fn a_pixel_told_fragment_by_fragment_is_the_same() {
     let header = header(8, 8, 8);
     let fragments: Vec<Fragment> = crowd(&header, 80, 7).into_iter().filter(|f| f.x == 0).collect();
     let trace = trace(&header, &fragments);
-    for name in ["lk", "systematic", "residual", "enderton", "exact"] {
+    for name in ["lk", "systematic", "residual", "enderton", "hashed-alpha", "exact"] {
         let design = crate::util::design(name);
         let explained = design.explain(&trace, 8, 5, Site { x: 0, y: 0 }, &|_, _| ()).unwrap();
         let picture = crate::util::picture(&design, &trace, 8, 5);
