@@ -71,7 +71,9 @@ impl<S: Simd> Waiting<S> {
         let depth = composite.depth(layer);
         let tied = depth.simd_eq(waits.depth).to_bitmask() | u64::from(layer.rough);
         composite.broken |= u64::from(covered) & tied;
-        let nearer = depth.simd_lt(waits.depth).to_bitmask();
+        // As a mask where the next layer waits for it, as bits where masks are of another width.
+        let nearer = depth.simd_lt(waits.depth);
+        let stays = mask32x8::from_bitmask(simd, covered.into()) & !nearer;
         let new = Mixed {
             depth,
             alpha: f64x8::splat(simd, layer.alpha),
@@ -79,7 +81,7 @@ impl<S: Simd> Waiting<S> {
         };
         let next = new.or(simd, nearer, waits);
         composite.add_mixed(&next, covered);
-        *waits = new.or(simd, u64::from(covered) & !nearer, waits);
+        *waits = new.or(simd, stays, waits);
     }
 
     /// As [`Composite::over`].
@@ -93,10 +95,10 @@ impl<S: Simd> Waiting<S> {
 impl<S: Simd> Mixed<S> {
     /// This at the samples of the set, the other one elsewhere.
     #[inline(always)]
-    fn or(&self, simd: S, set: u64, other: &Self) -> Self {
-        let wide = mask64x8::from_bitmask(simd, set);
+    fn or(&self, simd: S, set: mask32x8<S>, other: &Self) -> Self {
+        let wide = mask64x8::from_bitmask(simd, set.to_bitmask());
         let mut mixed = *other;
-        mixed.depth = mask32x8::from_bitmask(simd, set).select(self.depth, other.depth);
+        mixed.depth = set.select(self.depth, other.depth);
         mixed.alpha = wide.select(self.alpha, other.alpha);
         for (mixed, own) in mixed.colour.iter_mut().zip(self.colour) {
             *mixed = wide.select(own, *mixed);

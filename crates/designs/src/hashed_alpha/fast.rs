@@ -64,6 +64,10 @@ impl<const N: usize> FastSampler<N> for FastHashed {
             return L::mask(simd, 0);
         }
         tally.hashed(2 * passed.count_ones());
+        let opacity = limit.threshold().value();
+        if opacity >> 32 == 1 {
+            return L::mask(simd, passed);
+        }
         let HashedThreshold { scale, depth_in_pixels, .. } = self.plain;
         let cells = Cells::of(scale, depth_in_pixels, fragment.site(), fragment.depth());
         // A loop, for what is handed to `map` would not be compiled for the level's instructions.
@@ -74,9 +78,8 @@ impl<const N: usize> FastSampler<N> for FastHashed {
             let hashed = mixed(simd, with_sample.xor(L::splat(simd, exponent as i32)));
             hashed.store(&mut words[..L::LEN]);
         }
-        // ⌊v⌋ < T just where v < T; and all pass where T is 2^32.
-        let (mix, opacity) = (Mix::of(cells.between), limit.threshold().value());
-        let below = if opacity >> 32 == 1 { f64::INFINITY } else { opacity as f64 };
+        // ⌊v⌋ < T just where v < T.
+        let (mix, below) = (Mix::of(cells.between), opacity as f64);
         let mut chosen = [0; MAX_SAMPLES as usize];
         for s in 0..L::LEN {
             let [lower, upper] = [words[0][s] as u32, words[1][s] as u32];
