@@ -2,7 +2,9 @@
 
 mod fast;
 mod lanes;
+mod layer;
 mod order;
+mod resolve;
 
 use fearless_simd::Level;
 

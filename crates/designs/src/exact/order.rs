@@ -1,45 +1,54 @@
 //! Short lists of keys put in order.
 
-use fearless_simd::{Simd, i32x16, prelude::*};
+use fearless_simd::{Simd, i32x8, prelude::*};
 
-/// Layers that are ranked and composited at a time.
+/// Keys that are ranked, at most: more are sorted.
 pub(super) const CHUNK: usize = 128;
 
-/// Up to [`CHUNK`] keys, which stand in API order, cut to 32 bits in `short`; padded
-/// with large ones.
+/// Keys that are compared at a time: in halves, of which machines with AVX-512, too, compare
+/// more at a time.
+const RANKED: usize = 16;
+
+/// Tells of up to [`CHUNK`] keys, which stand in API order, how many of the others are
+/// smaller: the place of each when they are sorted, but that of depths that differ in their
+/// last bits only the later one comes first; whether the order is right is found out when the
+/// layers are composited. This takes more comparisons than a sort, but sixteen at a time, and
+/// none to be guessed.
 #[inline(always)]
-pub(super) fn shorten<'a>(keys: &[u64], short: &'a mut [i32; CHUNK]) -> &'a [i32] {
-    let padded = &mut short[..keys.len().next_multiple_of(RANKED)];
-    for (i, (short, key)) in padded.iter_mut().zip(keys).enumerate() {
+pub(super) fn rank_all<S: Simd>(simd: S, keys: &[u64], mut place: impl FnMut(usize, usize)) {
+    let mut short = [i32::MAX; CHUNK];
+    for (i, (short, key)) in short.iter_mut().zip(keys).enumerate() {
         let depth = (key >> 32) as u32 / CHUNK as u32;
         let key = depth * CHUNK as u32 + (CHUNK - 1 - i) as u32;
         // Signed, which all instruction sets compare.
         *short = (key ^ 1 << 31) as i32;
     }
-    padded[keys.len()..].fill(i32::MAX);
-    padded
-}
-
-/// Keys that are compared at a time.
-const RANKED: usize = 16;
-
-/// How many of the keys are smaller: the place of this one when they are sorted, but
-/// that of depths that differ in their last bits only the later one comes first;
-/// whether the order is right is found out when the layers are composited. This takes
-/// more comparisons than a sort, but sixteen at a time, and none to be guessed.
-#[inline(always)]
-pub(super) fn rank<S: Simd>(simd: S, key: i32, short: &[i32]) -> usize {
-    let key = i32x16::splat(simd, key);
-    let mut rank = 0;
-    for keys in short.chunks_exact(RANKED) {
-        rank += i32x16::from_slice(simd, keys).simd_lt(key).to_bitmask().count_ones();
+    for (chunk, own) in short[..keys.len().next_multiple_of(RANKED)].chunks(RANKED).enumerate() {
+        let own = [0, 8].map(|i| i32x8::from_slice(simd, &own[i..][..8]));
+        let mut ranks = [i32x8::splat(simd, 0); 2];
+        for other in &short[..keys.len()] {
+            let other = i32x8::splat(simd, *other);
+            for (ranks, own) in ranks.iter_mut().zip(own) {
+                // A mask's ones are −1.
+                *ranks -= own.simd_gt(other).to_vector();
+            }
+        }
+        let first = chunk * RANKED;
+        let mut list = [0; RANKED];
+        for (list, ranks) in list.chunks_mut(8).zip(ranks) {
+            ranks.store_slice(list);
+        }
+        for (i, rank) in list[..RANKED.min(keys.len() - first)].iter().enumerate() {
+            place(first + i, *rank as usize % CHUNK);
+        }
     }
-    rank as usize
 }
 
 /// Keeps the keys that are marked, without a branch that would be taken at random.
 #[inline(always)]
-pub(super) fn keep(keys: impl Iterator<Item = (u64, bool)>, kept: &mut Vec<u64>) {
+pub(super) fn keep(keys: impl ExactSizeIterator<Item = (u64, bool)>, kept: &mut Vec<u64>) {
+    kept.clear();
+    kept.resize(keys.len(), 0);
     let mut count = 0;
     for (key, keep) in keys {
         kept[count] = key;
@@ -48,8 +57,12 @@ pub(super) fn keep(keys: impl Iterator<Item = (u64, bool)>, kept: &mut Vec<u64>)
     kept.truncate(count);
 }
 
-/// Sorts keys of which few are out of place.
-pub(super) fn insert_in_order(keys: &mut [u64]) {
+/// Sorts keys of which few are out of place, at best.
+pub(super) fn sort_nearly_sorted(keys: &mut [u64]) {
+    if keys.len() > CHUNK {
+        keys.sort_unstable();
+        return;
+    }
     for end in 1..keys.len() {
         let key = keys[end];
         let mut place = end;

@@ -3,7 +3,10 @@
 use crate::exact::fast::Fast;
 use crate::{REFERENCE, configure};
 use screendoor_rop::fast::levels;
-use screendoor_rop::{EventCounts, Frame, Implementation, Listener, TileState, TiledDesign};
+use screendoor_rop::{
+    BlockList, EventCounts, Frame, Implementation, Listener, TileState, TiledDesign,
+};
+use screendoor_trace::picture::TilePixels;
 use screendoor_trace::random::Stream;
 use screendoor_trace::tile::{TILE_PIXELS, TileGrid, TileId};
 use screendoor_trace::trace::{Block, DepthPlane, Fragment, SampleMask, Unorm32};
@@ -154,6 +157,13 @@ fn assert_same(frame: &Frame, fragments: &[Fragment], what: &str) {
                 .map(|(engine, state)| engine.contents(state, within));
             assert_eq!(a, b, "{what}");
         }
+        let mut counted = EventCounts::default();
+        let blocks = Block::all_of(fragments);
+        let told = Listener::Counts(&mut counted);
+        let at_once = fast.picture(frame.grid, TILE, &mut BlockList::new(&blocks), told);
+        let bits = |p: TilePixels| p.map(|colour| colour.map(f64::to_bits));
+        assert_eq!(bits(at_once.expect("it has one")), bits(picture), "{what}, at once");
+        assert_eq!(counted, counts, "{what}, at once");
         assert_eq!(fast.state_bits(), reference_engine.state_bits());
         assert_eq!(fast.passes(), reference_engine.passes());
     }

@@ -17,10 +17,18 @@
 //! all neighbours in the file share theirs and hide each other; and the power lets an alpha of 0.1
 //! pass a third of the time.
 
+mod cells;
+mod fast;
+
+use fearless_simd::Level;
+
+use crate::hashed_alpha::cells::{Cells, fraction};
+use crate::hashed_alpha::fast::FastHashed;
+use screendoor_rop::fast::{Count, FastEngine, Width};
 use screendoor_rop::stochastic::{self, Round, Sampler, Stochastic};
 use screendoor_rop::{
     Blueprint, Dither, Family, Frame, Info, OpaquePromise, OrderPromise, Probe, Promise, Promises,
-    Samples, Site, TILE, Threshold, colour, depth_bits,
+    Samples, Site, TILE, Threshold, TiledDesign, colour, depth_bits,
 };
 use screendoor_trace::error::Result;
 use screendoor_trace::param::{Typed, Values};
@@ -85,15 +93,21 @@ impl Blueprint for HashedAlpha {
     type At<const N: usize> = Stochastic<HashedThreshold, N>;
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
-        let sampler = HashedThreshold {
-            noise: values.get(NOISE),
-            power: values.get(POWER),
-            each: values.get(THRESHOLD),
-            scale: values.get(SCALE),
-            depth_in_pixels: f64::from(frame.grid.width().max(frame.grid.height()))
-                / 2_f64.powi(32),
-        };
-        Ok(stochastic::single_pass(values, frame, sampler))
+        Ok(stochastic::single_pass(values, frame, HashedThreshold::of(values, frame)))
+    }
+
+    fn fast<const N: usize>(
+        values: &Values,
+        frame: &Frame,
+        level: Level,
+    ) -> Result<Option<Box<dyn TiledDesign>>>
+    where
+        Count<N>: Width,
+    {
+        let twin = FastHashed::new(HashedThreshold::of(values, frame), depth_bits::of(values));
+        let plain = Self::at::<N>(values, frame)?;
+        let Some(sampler) = twin.filter(|_| plain.keeps_colours()) else { return Ok(None) };
+        Ok(Some(Box::new(FastEngine::new(plain, sampler, level))))
     }
 
     fn promises(values: &Values) -> Promises {
@@ -132,6 +146,18 @@ const PLACES: f64 = 32.0;
 const MOVED: f64 = 0.013;
 
 impl HashedThreshold {
+    /// As `values` say.
+    fn of(values: &Values, frame: &Frame) -> Self {
+        HashedThreshold {
+            noise: values.get(NOISE),
+            power: values.get(POWER),
+            each: values.get(THRESHOLD),
+            scale: values.get(SCALE),
+            depth_in_pixels: f64::from(frame.grid.width().max(frame.grid.height()))
+                / 2_f64.powi(32),
+        }
+    }
+
     /// What alpha is compared with, 0 to 1, for `sample` of a fragment; `cells` are the
     /// fragment's where the noise is of its place.
     fn threshold(
@@ -177,53 +203,6 @@ impl HashedThreshold {
         };
         if self.power == 1.0 { uniform } else { libm::pow(uniform, self.power) }
     }
-
-    /// The cells of the published threshold that a fragment lies in: all its samples share them.
-    fn cells(&self, site: Site, fragment: &Fragment) -> Cells {
-        let depth = |unorm: f64| unorm * self.depth_in_pixels;
-        let place = [
-            f64::from(site.x) + 0.5,
-            f64::from(site.y) + 0.5,
-            depth(f64::from(fragment.depth.z.0)),
-        ];
-        // How far the place moves from one pixel to the next.
-        let step = |slope: i32| {
-            let slope = depth(f64::from(slope));
-            (1.0 + slope * slope).sqrt()
-        };
-        let step = step(fragment.depth.dzdx).max(step(fragment.depth.dzdy));
-        // The two powers of two beside the pixel's scale, and how near it is to the
-        // upper one.
-        let log = libm::log2(1.0 / (self.scale * step));
-        let cell = |exponent: f64| {
-            let scale = libm::exp2(exponent);
-            let [x, y, z] = place.map(|p| (p * scale).floor() as i64 as u32);
-            [x, y, z, exponent as i32 as u32]
-        };
-        Cells { between: log - log.floor(), cells: [cell(log.floor()), cell(log.ceil())] }
-    }
-}
-
-/// Cells of two sizes, the smaller exponent first, and how near the pixel's is to the upper.
-struct Cells {
-    between: f64,
-    cells: [[u32; 4]; 2],
-}
-
-impl Cells {
-    /// The published threshold in (0, 1] of a fragment, from `sample` on where each has its own.
-    fn threshold(&self, seed: u32, object: u32, sample: u32) -> f64 {
-        let value = |[x, y, z, exponent]: [u32; 4]| {
-            fraction(hash([seed, object, x, y, z, sample, exponent]))
-        };
-        let ([lower, upper], between) = (self.cells.map(value), self.between);
-        uniform((1.0 - between) * lower + between * upper, between.min(1.0 - between))
-    }
-}
-
-/// A word as a number between 0 and 1.
-fn fraction(word: u32) -> f64 {
-    (f64::from(word) + 0.5) / 2_f64.powi(32)
 }
 
 /// xxHash's 32-bit hash of three words, as shaders have it (Jarzynski, Olano: Hash Functions for
@@ -244,21 +223,6 @@ fn pcg(word: u32) -> u32 {
     let state = word.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
     let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
     word >> 22 ^ word
-}
-
-/// Makes a weighted mean of two uniform numbers uniform: its distribution function,
-/// where the smaller weight is `a` (I3D 2017, section 3.3).
-fn uniform(x: f64, a: f64) -> f64 {
-    if a <= 0.0 {
-        return x;
-    }
-    if x < a {
-        x * x / (2.0 * a * (1.0 - a))
-    } else if x < 1.0 - a {
-        (x - a / 2.0) / (1.0 - a)
-    } else {
-        1.0 - (1.0 - x) * (1.0 - x) / (2.0 * a * (1.0 - a))
-    }
 }
 
 impl<const N: usize> Sampler<N> for HashedThreshold {
@@ -282,7 +246,8 @@ impl<const N: usize> Sampler<N> for HashedThreshold {
     ) -> SampleMask {
         let opacity = Threshold::of(fragment.alpha);
         let in_cells = self.noise == Noise::Place && !passed.is_empty();
-        let cells = in_cells.then(|| self.cells(site, fragment));
+        let cells =
+            in_cells.then(|| Cells::of(self.scale, self.depth_in_pixels, site, fragment.depth));
         let passes = |sample: u32, probe: &mut P| {
             // Of a place two, one for each scale; nvpro's is a hash of a hash of a hash; a mask is
             // looked up.
@@ -306,94 +271,4 @@ impl<const N: usize> Sampler<N> for HashedThreshold {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use screendoor_trace::random::Stream;
-
-    #[test]
-    fn mixed_hashes_are_uniform_again() {
-        for between in [0.0, 0.1, 0.3, 0.5, 0.8] {
-            let mut random = Stream::new([1, (between * 10.0) as u32]);
-            let mut tenths = [0; 10];
-            for _ in 0..100_000 {
-                let (lower, upper) = (f64::from(random.unit()), f64::from(random.unit()));
-                let x = (1.0 - between) * lower + between * upper;
-                let u = uniform(x, between.min(1.0 - between));
-                assert!((0.0..=1.0).contains(&u));
-                tenths[((u * 10.0) as usize).min(9)] += 1;
-            }
-            // Binomial: σ = 95; the bound is six of them.
-            assert!(tenths.iter().all(|n: &i32| (n - 10_000).abs() < 570), "{tenths:?}");
-        }
-    }
-
-    fn threshold(noise: Noise, power: f64) -> HashedThreshold {
-        let (each, scale, depth_in_pixels) = (Each::Sample, 1.0, 1.0);
-        HashedThreshold { noise, power, each, scale, depth_in_pixels }
-    }
-
-    #[test]
-    fn alphas_pass_as_often_as_the_power_says() {
-        let site = |i: u16| Site { x: i % 64, y: i / 64 };
-        for (noise, power) in [
-            (Noise::Primitive, 1.0),
-            (Noise::StochasticSplats, 1.0),
-            (Noise::Nvpro, 1.0),
-            (Noise::Spark, 1.0),
-            (Noise::Mask, 1.0),
-            (Noise::Mask, 2.2),
-            (Noise::Primitive, 2.2),
-        ] {
-            let of = threshold(noise, power);
-            let fragment = Fragment { primitive: 7, ..Fragment::default() };
-            for alpha in [0.1, 0.3, 0.5] {
-                let passed =
-                    (0..4096).filter(|i| of.threshold(3, site(*i), &fragment, None, 0) < alpha);
-                let share = passed.count() as f64 / 4096.0;
-                // A mask holds each rank once; of white noise σ is 0.008 at most, and the bound six of them.
-                let bound = if noise == Noise::Mask { 3e-4 } else { 0.048 };
-                assert!(
-                    (share - alpha.powf(1.0 / power)).abs() < bound,
-                    "{noise:?} {alpha} {share}"
-                );
-            }
-        }
-    }
-
-    #[test]
-    fn shipped_hashes_are_those_of_their_shaders() {
-        // Computed by hand from the shaders' texts, in another language.
-        assert_eq!(xxhash32([0, 0, 0]), 0xa5e2b579);
-        assert_eq!(xxhash32([1, 2, 3]), 0x0e7ee77e);
-        assert_eq!([pcg(0), pcg(1)], [0x07bb2fe2, 0xa8beea3c]);
-        let of = |primitive: u32, x: u16, sample: u32| {
-            let fragment = Fragment { primitive, ..Fragment::default() };
-            threshold(Noise::StochasticSplats, 1.0).threshold(
-                9,
-                Site { x, y: 5 },
-                &fragment,
-                None,
-                sample,
-            )
-        };
-        // What the sum in front of the hash makes equal, which white noise would not.
-        assert_eq!(of(7, 10, 0), of(6, 11, 0));
-        assert_eq!(of(7 + 256, 10, 0), of(7, 10, 1));
-        assert_ne!(of(7, 10, 0), of(7, 11, 0));
-    }
-
-    #[test]
-    fn masks_have_32_places_and_most_neighbours_share_theirs() {
-        let of = threshold(Noise::Mask, 1.0);
-        let row = |primitive: u32| -> Vec<u64> {
-            let fragment = Fragment { primitive, ..Fragment::default() };
-            let at = |x| of.threshold(1, Site { x, y: 0 }, &fragment, None, 0).to_bits();
-            (0..64).map(at).collect()
-        };
-        let rows: Vec<Vec<u64>> = (0..1000).map(row).collect();
-        let places: std::collections::HashSet<&Vec<u64>> = rows.iter().collect();
-        assert_eq!(places.len(), 32);
-        let shared = rows.windows(2).filter(|pair| pair[0] == pair[1]).count();
-        assert!((570..600).contains(&shared), "{shared}");
-    }
-}
+mod tests;
