@@ -1,6 +1,8 @@
 //! The choice of samples and the account of its errors with pixels in lanes: what
 //! [`FastResidual`] does to one, done to sixteen.
 
+#![allow(clippy::needless_range_loop, reason = "loops over samples are unrolled into registers")]
+
 #[cfg(test)]
 mod tests;
 
@@ -44,7 +46,6 @@ fn unsigned<S: Simd>(vector: i32x16<S>) -> u32x16<S> {
     vector.bitcast()
 }
 
-#[allow(clippy::needless_range_loop, reason = "loops over samples are unrolled into registers")]
 impl<const N: usize> Abreast<N> for FastResidual<N>
 where
     Count<N>: fast::Width,
