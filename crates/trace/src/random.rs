@@ -40,11 +40,14 @@ pub const fn hash_on<const N: usize>(mut h: u32, words: [u32; N]) -> u32 {
     h
 }
 
+/// What keeps 0 from being mapped to itself by [`mix`].
+pub const PREHASHED: u32 = 0xe6fe_3beb;
+
 /// A run's seed as an offset that leaves seed 0 where a publication has it:
 /// `scatter(0) == 0`, all other seeds land far apart.
 #[inline]
 pub const fn scatter(seed: u32) -> u32 {
-    if seed == 0 { 0 } else { mix(seed ^ 0xe6fe_3beb) }
+    if seed == 0 { 0 } else { mix(seed ^ PREHASHED) }
 }
 
 /// A stream of random words for scene generation, where one thing has many

@@ -41,7 +41,7 @@ impl Width {
 pub(super) const POINT: u32 = 20;
 
 /// Binary digits after the point of a mass.
-const MASS: u32 = 15;
+pub(super) const MASS: u32 = 15;
 
 /// Red, green, blue and coverage.
 pub(super) type Sums = [i32; 4];

@@ -4,14 +4,16 @@
 
 use fearless_simd::Simd;
 
+#[cfg(test)]
+use crate::residual::abreast::LaneFlaw;
 use crate::residual::choice::Drawing;
 use crate::residual::errors::{
     Entry, Sums, Width, attenuated, centre, mass_of, of_pixel, share, shown,
 };
 use crate::residual::{ResidualSampler, Residue};
 use screendoor_rop::fast::{
-    self, Count, FastSampler, Lanes, Loaded, Offered, OneByOne, Tally, below, in_sample_order,
-    picked, ranks, teeth,
+    self, Count, FastSampler, Lanes, Loaded, Offered, Tally, below, in_sample_order, picked, ranks,
+    teeth,
 };
 use screendoor_rop::stochastic::comb::exchanges;
 use screendoor_rop::{Dither, PixelIndex, Probe, ReferenceKey, Round, Samples};
@@ -19,23 +21,25 @@ use screendoor_trace::tile::{TILE_PIXELS, TileGrid, TileId};
 
 /// [`ResidualSampler`] with errors of one depth.
 pub(super) struct FastResidual<const N: usize> {
-    plain: ResidualSampler<N>,
+    pub(super) plain: ResidualSampler<N>,
+    #[cfg(test)]
+    pub(super) flaw: Option<LaneFlaw>,
 }
 
 /// What a pixel keeps beside its samples.
 #[derive(Clone, Copy)]
 pub(super) struct Kept<R> {
-    index: PixelIndex,
-    fragments: u32,
+    pub(super) index: PixelIndex,
+    pub(super) fragments: u32,
     /// What ξ of all fragments have in common where they are white.
-    white: u32,
+    pub(super) white: u32,
     /// Whether anything was drawn: until then there is no entry.
-    begun: bool,
-    z: u32,
-    mass: u32,
-    sums: Sums,
+    pub(super) begun: bool,
+    pub(super) z: u32,
+    pub(super) mass: u32,
+    pub(super) sums: Sums,
     /// The samples' colours as the sums take them.
-    fixed: [R; 3],
+    pub(super) fixed: [R; 3],
 }
 
 /// What ξ is made of.
@@ -55,7 +59,17 @@ impl<const N: usize> FastResidual<N> {
     pub(super) fn new(plain: ResidualSampler<N>) -> Option<Self> {
         let store = &plain.store;
         let simple = store.layers == 1 && store.parts == 1 && store.width == Width::Whole;
-        (simple && plain.drawing == Drawing::Paired).then_some(FastResidual { plain })
+        (simple && plain.drawing == Drawing::Paired).then_some(FastResidual {
+            plain,
+            #[cfg(test)]
+            flaw: None,
+        })
+    }
+
+    /// What shows wrongly of errors with these sums.
+    pub(super) fn shown_wrongly(&self, sums: &Sums) -> [f64; 3] {
+        let [r, g, b, _] = self.plain.store.fractions([sums].into_iter());
+        [r, g, b]
     }
 }
 
@@ -65,7 +79,12 @@ where
 {
     type Plain = ResidualSampler<N>;
     type State = Kept<<Count<N> as fast::Width>::Row>;
-    type Abreast = OneByOne<Self::State>;
+    type Abreast = Self;
+
+    fn abreast(&self) -> Option<&Self> {
+        // ξ of the others is looked up.
+        (self.plain.dither == Dither::White).then_some(self)
+    }
 
     fn clear(&self, grid: TileGrid, tile: TileId) -> Vec<Self::State> {
         let cleared = |index| Kept {
@@ -107,8 +126,7 @@ where
     }
 
     fn excess(&self, _: &ResidualSampler<N>, kept: &Self::State) -> [f64; 3] {
-        let [r, g, b, _] = self.plain.store.fractions([&kept.sums].into_iter());
-        [r, g, b]
+        self.shown_wrongly(&kept.sums)
     }
 
     #[inline(always)]

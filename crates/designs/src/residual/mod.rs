@@ -8,9 +8,11 @@
 //! samples passed a test, its expectation is 0 and the picture stays unbiased, however roughly
 //! the depths follow the fragments. Derivation: `docs/RESIDUAL.md`.
 
+mod abreast;
 mod choice;
 mod errors;
 mod fast;
+mod products;
 #[cfg(test)]
 mod tests;
 

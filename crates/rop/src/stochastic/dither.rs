@@ -25,7 +25,7 @@ const RANK_BITS: u32 = 2 * TILE_BITS;
 
 /// A hash's last word that keeps it apart from others of the same seed and pixel.
 const OFFSET: u32 = 0x0ff5_e700;
-const FINE: u32 = 0x0f19_e000;
+pub(crate) const FINE: u32 = 0x0f19_e000;
 const ROUND: u32 = 0x0c0d_e500;
 
 impl Dither {

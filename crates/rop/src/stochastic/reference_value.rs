@@ -2,7 +2,7 @@
 //! scrambles of the radical inverse, from one hash to the next better mixed.
 
 use crate::stochastic::pixel_order::PixelIndex;
-use screendoor_trace::random::{hash, mix, scatter};
+use screendoor_trace::random::{PREHASHED, hash, mix, scatter};
 
 screendoor_trace::options! {
     /// How reference values are made.
@@ -102,9 +102,6 @@ impl ReferenceKey {
 pub const fn prehash(n: u32) -> u32 {
     mix(n ^ PREHASHED)
 }
-
-/// The constant of [`prehash`].
-pub(crate) const PREHASHED: u32 = 0xe6fe_3beb;
 
 /// LK figure 4, lines 1 and 2: the reversed bits of the place in the sequence, and
 /// the seed by which figure 4 moves it on: the surface.

@@ -83,6 +83,10 @@ impl<F: FastSampler<N>, const N: usize> FastEngine<F, N>
 where
     Count<N>: Width,
 {
+    /// Whether there are kernels with pixels in lanes: the compiler leaves out those that a
+    /// constant says are never run.
+    const ABREAST: bool = N <= abreast::MOST_SAMPLES;
+
     /// Whether it pays to look at many fragments of the tile at once, of which there are `rows`.
     fn draws_together(&self, pass: u32, rows: usize, listener: &Listener<'_>) -> bool {
         abreast::worth_it(N, rows)
@@ -100,26 +104,55 @@ where
         }
     }
 
+    /// Adds blocks' rows to a window while there is room, up to one that comes to the near end
+    /// of the depth range: it and the rest of its block, if there is any.
+    fn fill(
+        &self,
+        sampler: &F::Abreast,
+        window: &mut abreast::Window,
+        blocks: &mut dyn Blocks,
+    ) -> Option<Vec<Fragment>> {
+        while window.has_room()
+            && let Some(block) = blocks.next()
+        {
+            if let Some(near) = self.add(sampler, window, block) {
+                return Some((near..block.rows()).map(|row| block.fragment(row)).collect());
+            }
+        }
+        None
+    }
+
     fn add(
         &self,
         sampler: &F::Abreast,
         window: &mut abreast::Window,
         block: &Block,
     ) -> Option<usize> {
-        crate::for_level!(self.level, simd => abreast::add(simd, self, sampler, window, block))
+        if Self::ABREAST {
+            crate::for_level!(self.level, simd => abreast::add(simd, self, sampler, window, block))
+        } else {
+            unreachable!("too many samples")
+        }
     }
 
-    /// Draws fragments of which the first comes to the near end of the depth range.
-    fn draw_near(
+    /// Draws what a window holds, then the `rest` of a block, whose first fragment comes to the
+    /// near end, and all blocks after it.
+    fn draw_filled(
         &self,
         pass: u32,
         state: &mut TileState,
-        fragments: &[Fragment],
+        window: &mut abreast::Window,
+        (rest, blocks): (Option<Vec<Fragment>>, &mut dyn Blocks),
         mut listener: Listener<'_>,
     ) {
+        self.draw_window(pass, own::<F, N>(state), window, listener.again());
+        let Some(rest) = rest else { return };
         own::<F, N>(state).near = true;
-        for block in Block::all_of(fragments) {
+        for block in Block::all_of(&rest) {
             self.draw(pass, state, &block, listener.again());
+        }
+        while let Some(block) = blocks.next() {
+            self.draw(pass, state, block, listener.again());
         }
     }
 
@@ -128,13 +161,17 @@ where
         &self,
         sampler: &F::Abreast,
         round: Round,
-        states: &mut [F::State; TILE_PIXELS],
+        states: &[F::State; TILE_PIXELS],
         window: &mut abreast::Window,
         probe: &mut P,
     ) -> TilePixels {
-        crate::for_level!(self.level, simd => {
-            abreast::picture(simd, self, sampler, round, states, window, probe)
-        })
+        if Self::ABREAST {
+            crate::for_level!(self.level, simd => {
+                abreast::picture(simd, self, (sampler, round), states, window, probe)
+            })
+        } else {
+            unreachable!("too many samples")
+        }
     }
 
     /// Draws a window's fragments and empties it.
@@ -165,9 +202,13 @@ where
             unreachable!("it draws together")
         };
         self.enter(round, tile);
-        crate::for_level!(self.level, simd => {
-            abreast::draw(simd, self, sampler, round, tile, window, probe)
-        })
+        if Self::ABREAST {
+            crate::for_level!(self.level, simd => {
+                abreast::draw(simd, self, (sampler, round), tile, window, probe)
+            })
+        } else {
+            unreachable!("too many samples")
+        }
     }
 
     /// Makes a tile's states ready for a round.
@@ -182,11 +223,6 @@ where
 thread_local! {
     /// Each thread's own.
     static WINDOW: Cell<Option<Box<abreast::Window>>> = const { Cell::new(None) };
-}
-
-/// A block's fragments from a row on.
-fn from_row(block: &Block, first: usize) -> Vec<Fragment> {
-    (first..block.rows()).map(|row| block.fragment(row)).collect()
 }
 
 /// A tile of this engine's.
@@ -253,20 +289,14 @@ where
         }
         let Some(sampler) = self.sampler.abreast() else { unreachable!("it draws together") };
         let mut window = WINDOW.take().unwrap_or_else(|| Box::new(abreast::Window::new()));
-        while let Some(block) = blocks.next() {
-            if own::<F, N>(state).near {
-                self.draw(pass, state, block, listener.again());
-                continue;
-            }
-            if !window.has_room() {
-                self.draw_window(pass, own::<F, N>(state), &mut window, listener.again());
-            }
-            if let Some(near) = self.add(sampler, &mut window, block) {
-                self.draw_window(pass, own::<F, N>(state), &mut window, listener.again());
-                self.draw_near(pass, state, &from_row(block, near), listener.again());
+        loop {
+            let rest = self.fill(sampler, &mut window, blocks);
+            let more = rest.is_none() && !window.has_room();
+            self.draw_filled(pass, state, &mut window, (rest, blocks), listener.again());
+            if !more {
+                break;
             }
         }
-        self.draw_window(pass, own::<F, N>(state), &mut window, listener.again());
         WINDOW.set(Some(window));
     }
 
@@ -275,42 +305,35 @@ where
         grid: TileGrid,
         tile: TileId,
         blocks: &mut dyn Blocks,
-        mut listener: Listener<'_>,
+        listener: Listener<'_>,
     ) -> Option<TilePixels> {
         let fits = blocks.rows() + BLOCK <= abreast::MOST_ROWS;
-        let single = TiledDesign::passes(self) == 1 && !self.plain.inner.has_sums();
-        if !(fits && single && self.draws_together(0, blocks.rows(), &listener)) {
+        if !(fits
+            && TiledDesign::passes(self) == 1
+            && self.draws_together(0, blocks.rows(), &listener))
+        {
             return None;
         }
         let sampler = self.sampler.abreast()?;
         let round = self.round(0)?;
         let mut window = WINDOW.take().unwrap_or_else(|| Box::new(abreast::Window::new()));
-        let mut rest = None;
-        while rest.is_none()
-            && let Some(block) = blocks.next()
-        {
-            rest = self.add(sampler, &mut window, block).map(|near| from_row(block, near));
-        }
+        let rest = self.fill(sampler, &mut window, blocks);
         let pixels = match rest {
             None => {
                 let mut states = boxed(self.sampler.clear(grid, tile));
                 self.sampler.enter(&round, &mut states);
                 let pixels = match listener {
                     Listener::Counts(counts) => {
-                        self.found(sampler, round, &mut states, &mut window, counts)
+                        self.found(sampler, round, &states, &mut window, counts)
                     }
-                    _ => self.found(sampler, round, &mut states, &mut window, &mut NoProbe),
+                    _ => self.found(sampler, round, &states, &mut window, &mut NoProbe),
                 };
                 window.clear();
                 pixels
             }
-            Some(rest) => {
+            rest => {
                 let mut state = TiledDesign::clear(self, grid, tile);
-                self.draw_window(0, own::<F, N>(&mut state), &mut window, listener.again());
-                self.draw_near(0, &mut state, &rest, listener.again());
-                while let Some(block) = blocks.next() {
-                    self.draw(0, &mut state, block, listener.again());
-                }
+                self.draw_filled(0, &mut state, &mut window, (rest, blocks), listener);
                 TiledDesign::resolve(self, grid, tile, &state)
             }
         };

@@ -40,9 +40,9 @@ where
     pub(super) opaque: Vec<Option<Box<Samples<N>>>>,
 }
 
-/// A list of a tile's pixels, its length known when kernels are compiled.
-pub(super) fn boxed<T>(pixels: Vec<T>) -> Box<[T; TILE_PIXELS]> {
-    let Ok(boxed) = pixels.into_boxed_slice().try_into() else { panic!("a tile's pixels") };
+/// A list whose length is known when kernels are compiled.
+pub(super) fn boxed<T, const LEN: usize>(list: Vec<T>) -> Box<[T; LEN]> {
+    let Ok(boxed) = list.into_boxed_slice().try_into() else { panic!("of another length") };
     boxed
 }
 

@@ -92,6 +92,15 @@ fn added<S: Simd, const N: usize>(
     }
 }
 
+/// Rounds of figure 4 with these factors.
+#[inline(always)]
+pub(super) fn scrambled<S: Simd>(simd: S, mut x: u32x16<S>, factors: &[u32]) -> u32x16<S> {
+    for factor in factors {
+        x = x ^ (x * u32x16::splat(simd, *factor));
+    }
+    x
+}
+
 /// The numbers that pass of those whose first value, before it is hashed by `ROUNDS` rounds of
 /// figure 4, is `x`.
 #[inline(always)]
@@ -102,11 +111,7 @@ pub(in crate::stochastic::fast) fn nested<S: Simd, const N: usize, const ROUNDS:
 ) -> u32x16<S> {
     let word = |word: u32| u32x16::splat(simd, word);
     if N == 1 {
-        let mut x = x;
-        for factor in &LK2011[..ROUNDS] {
-            x = x ^ (x * word(*factor));
-        }
-        return limits.pass(x).select(word(all(N)), word(0));
+        return limits.pass(scrambled(simd, x, &LK2011[..ROUNDS])).select(word(all(N)), word(0));
     }
     let bits = N.trailing_zeros();
     let top = |x: u32x16<S>| (x >> (32 - bits)) * word(ONES);

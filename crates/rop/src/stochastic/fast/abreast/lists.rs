@@ -7,6 +7,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, u32x16};
 
+use crate::stochastic::fast::abreast::MOST_SAMPLES;
 use screendoor_trace::tile::TILE_PIXELS;
 
 /// Pixels that are drawn side by side.
@@ -190,7 +191,7 @@ impl Lists {
 }
 
 /// The samples that a row's last word may name.
-pub(super) const COVERED: u32 = 0xffff;
+pub(super) const COVERED: u32 = (1 << MOST_SAMPLES) - 1;
 
 /// The four words of sixteen rows.
 #[inline(always)]

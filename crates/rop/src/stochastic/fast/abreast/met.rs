@@ -3,7 +3,7 @@
 use std::marker::PhantomData;
 
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, i32x16, mask32x16, u32x16};
+use fearless_simd::{Simd, f32x16, i32x16, mask32x16, u32x16};
 
 use crate::contract::event::Probe;
 use crate::stochastic::fast::abreast::packed::{count, left_by};
@@ -36,7 +36,9 @@ pub struct Met<'a, S: Simd, const N: usize> {
     pub coverage: u32x16<S>,
     /// Stored depths, one less than they are and their upper bit flipped; none is 0.
     pub stored: &'a [i32x16<S>; N],
-    /// The same of the samples that passed, and more than any depth of the others.
+    /// The fragments' depths at the samples in the same form.
+    pub depths: &'a [i32x16<S>; N],
+    /// Stored depths of the samples that passed, and more than any depth of the others.
     pub keys: &'a [i32x16<S>; N],
     /// Which passed, sample by sample.
     pub passes: &'a [mask32x16<S>; N],
@@ -46,6 +48,8 @@ pub struct Met<'a, S: Simd, const N: usize> {
     pub opaque: mask32x16<S>,
     /// What the fragments are part of, where that is asked for.
     pub source: u32x16<S>,
+    /// Red, green and blue of the fragments, where they are asked for.
+    pub colours: [f32x16<S>; 3],
 }
 
 /// A [`FastSampler`](crate::fast::FastSampler) with pixels in lanes in place of samples.
@@ -54,6 +58,9 @@ pub trait Abreast<const N: usize>: Send + Sync {
     type Kept;
     /// The same of sixteen.
     type Lanes<S: Simd>: Copy;
+
+    /// Whether it asks for the fragments' colours.
+    const COLOURS: bool = false;
 
     /// What it asks of fragments.
     fn source(&self) -> Source;
@@ -84,6 +91,11 @@ pub trait Abreast<const N: usize>: Send + Sync {
         met: &Met<'_, S, N>,
         counted: &mut Counted<S, P>,
     ) -> [mask32x16<S>; N];
+
+    /// As [`Sampler::excess`](crate::Sampler::excess), of sixteen pixels, where it corrects.
+    fn excess<S: Simd>(&self, _: &Self::Lanes<S>) -> [[f64; 3]; 16] {
+        [[0.0; 3]; 16]
+    }
 }
 
 /// Words of sixteen pixels, told one by one.

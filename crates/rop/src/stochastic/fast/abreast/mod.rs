@@ -13,7 +13,11 @@
     reason = "loops over samples are unrolled into registers, several lists at a time"
 )]
 
+mod colours;
+mod comb;
+mod depths;
 mod draw;
+mod held;
 mod hits;
 mod lists;
 mod met;
@@ -26,11 +30,12 @@ mod window;
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, u32x16};
 
+pub use comb::{exchanged_teeth, white};
 pub(super) use draw::{add, draw, picture};
 pub(super) use hits::nested;
 pub use met::{Abreast, Counted, Met, Source, gather};
 pub use packed::{Ranks, STRIDE, bit, left_by};
-use screendoor_trace::random::MIX;
+use screendoor_trace::random::{GOLDEN, MIX};
 pub use tracked::NumberedAbreast;
 pub(super) use tracked::from_first;
 pub(super) use window::Window;
@@ -60,44 +65,8 @@ pub fn mixed<S: Simd>(simd: S, x: u32x16<S>) -> u32x16<S> {
     x ^ (x >> 16)
 }
 
-/// A sampler that has no lanes of pixels.
-#[derive(Clone, Copy, Debug)]
-pub struct OneByOne<K>(std::marker::PhantomData<fn() -> K>, Never);
-
-#[derive(Clone, Copy, Debug)]
-enum Never {}
-
-impl<K, const N: usize> Abreast<N> for OneByOne<K> {
-    type Kept = K;
-    type Lanes<S: Simd> = ();
-
-    fn source(&self) -> Source {
-        match self.1 {}
-    }
-    fn load<S: Simd>(
-        &self,
-        _: S,
-        _: &crate::stochastic::methods::Round,
-        _: &[K; screendoor_trace::tile::TILE_PIXELS],
-        _: &[u8; 16],
-    ) {
-        match self.1 {}
-    }
-    fn store<S: Simd>(
-        &self,
-        (): &(),
-        _: &mut [K; screendoor_trace::tile::TILE_PIXELS],
-        _: &[u8; 16],
-    ) {
-        match self.1 {}
-    }
-    fn choose<S: Simd, P: crate::contract::event::Probe>(
-        &self,
-        _: S,
-        (): &mut (),
-        _: &Met<'_, S, N>,
-        _: &mut Counted<S, P>,
-    ) -> [fearless_simd::mask32x16<S>; N] {
-        match self.1 {}
-    }
+/// [`screendoor_trace::random::hash_on`] of one word in lanes.
+#[inline(always)]
+fn hashed_on<S: Simd>(simd: S, before: u32x16<S>, word: u32x16<S>) -> u32x16<S> {
+    mixed(simd, (before ^ word) + u32x16::splat(simd, GOLDEN))
 }

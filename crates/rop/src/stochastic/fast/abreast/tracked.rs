@@ -4,7 +4,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, i32x16, mask32x16, u32x16};
 
 use crate::contract::event::Probe;
-use crate::stochastic::fast::abreast::hits::Limits;
+use crate::stochastic::fast::abreast::hits::{Limits, scrambled};
 use crate::stochastic::fast::abreast::met::{Abreast, Counted, Met, Source, gather, words_of};
 use crate::stochastic::fast::abreast::packed::{Ranks, STRIDE, bit, count, pack, right_by, unpack};
 use crate::stochastic::fast::references::FastReferences;
@@ -12,7 +12,7 @@ use crate::stochastic::fast::tracked::{FastTracked, Rules, Switches, Track};
 use crate::stochastic::methods::Round;
 use crate::stochastic::reference_value::{LK2011, ReferenceKey};
 use crate::stochastic::surface::SurfaceRule;
-use screendoor_trace::random::scatter;
+use screendoor_trace::random::{PREHASHED, scatter};
 use screendoor_trace::tile::TILE_PIXELS;
 
 /// The samples of sixteen fragments that are to be numbered.
@@ -41,11 +41,7 @@ impl<S: Simd> NumberedAbreast<S> {
     /// The first of the values of figure 4.
     #[inline(always)]
     pub fn first_lk2011(&self, simd: S) -> u32x16<S> {
-        let mut x = self.reversed + self.moved;
-        for factor in LK2011 {
-            x = x ^ (x * u32x16::splat(simd, factor));
-        }
-        x
+        scrambled(simd, self.reversed + self.moved, &LK2011)
     }
 
     /// The numbers, packed, whose value passes.
@@ -234,7 +230,6 @@ fn keys_among<S: Simd, const N: usize>(simd: S, met: &Met<'_, S, N>) -> [i32x16<
 /// [`ReferenceKey::prehashed`].
 #[inline(always)]
 fn prehashed<S: Simd>(simd: S, surface: u32x16<S>, seed: u32) -> u32x16<S> {
-    use crate::stochastic::reference_value::PREHASHED;
     super::mixed(simd, (surface + u32x16::splat(simd, scatter(seed))) ^ PREHASHED)
 }
 

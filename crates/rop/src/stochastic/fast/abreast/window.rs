@@ -9,6 +9,7 @@ use crate::contract::frame::Frame;
 use crate::stochastic::fast::abreast::MOST_ROWS;
 use crate::stochastic::fast::abreast::lists::{COVERED, Counts, LANES, Lists, Row};
 use crate::stochastic::fast::abreast::met::Source;
+use crate::stochastic::fast::state::boxed;
 use screendoor_trace::trace::{BLOCK, Block};
 
 /// In a row's last word: depths do not follow from 32 bits.
@@ -21,11 +22,6 @@ pub(super) type Colour = [f32; 4];
 
 /// In place of a fragment: a sample that none has been written to.
 pub(super) const NOBODY: u32 = MOST_ROWS as u32;
-
-fn boxed<T, const N: usize>(list: Vec<T>) -> Box<[T; N]> {
-    let Ok(boxed) = list.into_boxed_slice().try_into() else { unreachable!("of this length") };
-    boxed
-}
 
 /// Fragments of a tile that are drawn together. It is filled again and again: memory that has
 /// been touched is cheaper than fresh memory.
