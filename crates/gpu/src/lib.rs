@@ -35,6 +35,8 @@ mod shader;
 mod tests;
 #[cfg(feature = "wgpu")]
 mod time;
+#[cfg(feature = "wgpu")]
+mod unroll;
 
 /// The most by which a channel of a blending design's picture may differ from the plain
 /// text's, as a share of one plus its value: these designs compute in single precision

@@ -174,9 +174,12 @@ fn shown(design: &Configured, trace: &Trace) -> String {
 /// One wrong bit or comparison in each part of the way. The designs that meet it, and whether
 /// threads are given samples.
 const DEFECTS: &[(&str, Threads, Defect)] = &[
-    ("lk", Threads::Pixel, ("x ^= x * 0xb82f1e52u", "x ^= x * 0xb82f1e53u")),
+    ("lk", Threads::Sample, ("x ^= x * 0xb82f1e52u", "x ^= x * 0xb82f1e53u")),
+    ("lk", Threads::Pixel, ("nested_round(n, 0xb82f1e52u)", "nested_round(n, 0xb82f1e50u)")),
+    ("lk", Threads::Pixel, ("0x73516240u", "0x73516204u")),
     ("lk", Threads::Pixel, ("<= depth[s]", "< depth[s]")),
-    ("lk", Threads::Pixel, ("depth[s] < depth[sample] ||", "depth[s] > depth[sample] ||")),
+    ("lk", Threads::Pixel, ("keys[t] < keys[s]", "keys[t] > keys[s]")),
+    ("lk", Threads::Pixel, ("place_bit(t) & counts;", "place_bit(t);")),
     ("lk", Threads::Pixel, ("surface_id += 1u", "surface_id += 2u")),
     ("lk", Threads::Pixel, ("covered |= s;", "covered |= s >> 1u;")),
     ("lk", Threads::Pixel, ("numbered += count;", "numbered += count & 6u;")),
