@@ -21,6 +21,8 @@ mod differences;
 #[cfg(feature = "wgpu")]
 mod guard;
 #[cfg(feature = "wgpu")]
+mod kept;
+#[cfg(feature = "wgpu")]
 mod loaders;
 mod options;
 #[cfg(feature = "wgpu")]
