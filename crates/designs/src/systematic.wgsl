@@ -67,3 +67,9 @@ fn references_begin(round: Round, key: ReferenceKey, opacity: Threshold, number:
 fn reference_of(round: Round, key: ReferenceKey, opacity: Threshold, number: u32, place: u32) -> u32 {
     return comb(start, exchanged(place, pairs), opacity);
 }
+
+fn hits_begin(round: Round, key: ReferenceKey, opacity: Threshold) {}
+
+fn hit(round: Round, key: ReferenceKey, opacity: Threshold, number: u32, place: u32) -> bool {
+    return passes(opacity, reference_of(round, key, opacity, number, place));
+}

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use crate::guard::Guard;
+use crate::kept::Store;
 use crate::options::Adapter;
 use crate::program::Compiled;
 use screendoor_trace::error::{Error, Result};
@@ -44,6 +45,7 @@ pub struct Gpu {
     pub(super) device: wgpu::Device,
     pub(super) queue: wgpu::Queue,
     pub(super) programs: Compiled,
+    pub(super) kept: Store,
     adapter: Adapter,
     guard: Guard,
 }
@@ -107,7 +109,8 @@ impl Gpu {
 
     fn of(adapter: Adapter, device: wgpu::Device, queue: wgpu::Queue) -> Self {
         let guard = Guard::new(&adapter);
-        Gpu { device, queue, programs: Compiled::default(), adapter, guard }
+        let (programs, kept) = (Compiled::default(), Store::default());
+        Gpu { device, queue, programs, kept, adapter, guard }
     }
 
     /// Gives the device up, as if the card had been taken out: whatever is asked of it from

@@ -21,6 +21,8 @@ mod differences;
 #[cfg(feature = "wgpu")]
 mod guard;
 #[cfg(feature = "wgpu")]
+mod kept;
+#[cfg(feature = "wgpu")]
 mod loaders;
 mod options;
 #[cfg(feature = "wgpu")]
@@ -35,6 +37,8 @@ mod shader;
 mod tests;
 #[cfg(feature = "wgpu")]
 mod time;
+#[cfg(feature = "wgpu")]
+mod unroll;
 
 /// The most by which a channel of a blending design's picture may differ from the plain
 /// text's, as a share of one plus its value: these designs compute in single precision

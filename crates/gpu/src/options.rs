@@ -42,8 +42,11 @@ pub struct GpuOptions<'a> {
     pub threads: Threads,
     /// Rows of a chunk, at most; fewer where a buffer holds fewer.
     pub rows: u64,
-    /// Bytes of chunks that stay on the device for the next pass.
+    /// Bytes of chunks that stay on the device for the next pass, or the next replay.
     pub resident: u64,
+    /// Whether chunks that an earlier replay of the trace has left on the device are drawn, and
+    /// are left for the next where all are `resident`.
+    pub keep: bool,
     /// Is told how many fragments have been drawn, of how many.
     pub progress: &'a (dyn Fn(u64, u64) + Sync),
 }
@@ -51,7 +54,8 @@ pub struct GpuOptions<'a> {
 impl Default for GpuOptions<'_> {
     fn default() -> Self {
         let threads = Threads::Pixel;
-        GpuOptions { threads, rows: u64::MAX, resident: 1 << 31, progress: &|_, _| () }
+        let progress = &|_, _| ();
+        GpuOptions { threads, rows: u64::MAX, resident: 1 << 31, keep: true, progress }
     }
 }
 

@@ -1,13 +1,15 @@
 //! Replaying a trace on a GPU: chunk by chunk, sorted by pixel there, a thread for each
 //! pixel; the pixels' state stays on the device.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use rayon::prelude::*;
 
-use crate::bin::{Binner, Scratch, Sorted, uniform};
+use crate::bin::{Binner, Scratch, uniform};
 use crate::chunk::{Chunks, Uploaded};
 use crate::device::{Gpu, most_bytes};
+use crate::kept::{Kept, Key, Ready};
 use crate::options::{GpuOptions, GpuSeconds, Threads};
 use crate::params::Params;
 use crate::program::Program;
@@ -46,10 +48,23 @@ struct Page {
     tiles: usize,
 }
 
-/// A chunk on the device, sorted.
-struct Ready {
-    uploaded: Uploaded,
-    sorted: Sorted,
+/// What sorts chunks.
+struct Sorter {
+    binner: Binner,
+    scratch: Scratch,
+    /// Each tile's place among the touched ones.
+    slots: Vec<u32>,
+}
+
+impl Sorter {
+    fn new(gpu: &Gpu, frame: &Frame, chunks: &Chunks) -> Result<Self> {
+        let most = (0..chunks.len()).map(|i| chunks.rows(i)).max().unwrap_or(0);
+        Ok(Sorter {
+            binner: Binner::new(gpu, frame.samples(), &chunks.types().collect::<Vec<_>>())?,
+            scratch: Scratch::new(gpu, most)?,
+            slots: vec![0; frame.grid.count()],
+        })
+    }
 }
 
 /// A program of a design.
@@ -214,44 +229,59 @@ impl<'a> GpuRun<'a> {
             seconds: GpuSeconds::default(),
             start,
         };
-        run.draw_all(trace, &chunks, options)?;
+        let (samples, columns) = (frame.samples(), frame.columns);
+        let key = Key { trace: trace.mark(), samples, columns, rows };
+        run.draw_all(trace, &chunks, key, options)?;
         gpu.wait("drawing")?;
         Ok(run)
     }
 
-    fn draw_all(&mut self, trace: &Trace, chunks: &Chunks, options: &GpuOptions<'_>) -> Result<()> {
-        let constants: Vec<_> = chunks.types().collect();
-        let binner = Binner::new(self.gpu, self.frame.samples(), &constants)?;
-        let most = (0..chunks.len()).map(|i| chunks.rows(i)).max().unwrap_or(0);
-        let scratch = Scratch::new(self.gpu, most)?;
-        let mut slots = vec![0_u32; self.frame.grid.count()];
-        let mut kept: Vec<Option<Ready>> = Vec::new();
+    fn draw_all(
+        &mut self,
+        trace: &Trace,
+        chunks: &Chunks,
+        key: Key,
+        options: &GpuOptions<'_>,
+    ) -> Result<()> {
+        let kept = if options.keep { self.gpu.kept.get(trace, &key)? } else { None };
+        let mut ready: Vec<Option<Arc<Ready>>> = vec![None; chunks.len()];
+        let mut sorter = None;
+        if let Some(kept) = kept {
+            self.tiles = kept.tiles;
+            self.make_room(0)?;
+            ready = kept.chunks.into_iter().map(Some).collect();
+        } else {
+            sorter = Some(Sorter::new(self.gpu, self.frame, chunks)?);
+        }
+        let pixels = self.frame.grid.count() * TILE_PIXELS;
+        let bytes = |i| Ready::bytes(chunks.bytes(i), chunks.rows(i), pixels);
         let mut left = options.resident;
         let passes = self.port.plain.passes();
+        // Only all chunks are of use for the next replay.
+        let keeps = options.keep && (0..chunks.len()).map(bytes).sum::<u64>() <= left;
         let (mut done, total) = (0, trace.rows() * u64::from(passes));
         for pass in 0..passes {
             self.params.pass_number = pass;
-            for i in 0..chunks.len() {
-                let fresh = match kept.get(i) {
-                    Some(Some(_)) => None,
-                    _ => {
+            for (i, place) in ready.iter_mut().enumerate() {
+                let chunk = match (&*place, &mut sorter) {
+                    (Some(chunk), _) => Arc::clone(chunk),
+                    (None, Some(sorter)) => {
                         let begun = Instant::now();
                         let uploaded = chunks.upload(self.gpu, trace, i, &self.params)?;
                         self.gpu.wait("uploading")?;
                         self.seconds.upload += begun.elapsed().as_secs_f64();
                         if pass == 0 {
-                            self.touch(&binner, &uploaded, &mut slots)?;
+                            self.touch(sorter, &uploaded)?;
                         }
-                        Some(self.sort(&binner, &scratch, uploaded, &slots)?)
+                        Arc::new(self.sort(sorter, uploaded)?)
                     }
+                    (None, None) => unreachable!("all chunks are kept, or none"),
                 };
-                let ready = fresh.as_ref().or_else(|| kept[i].as_ref()).expect("one of the two");
-                self.draw(ready)?;
-                self.fragments += u64::from(ready.sorted.kept);
-                if pass == 0 && passes > 1 {
-                    let fits = chunks.bytes(i) <= left;
-                    left -= if fits { chunks.bytes(i) } else { 0 };
-                    kept.push(fresh.filter(|_| fits));
+                self.draw(&chunk)?;
+                self.fragments += u64::from(chunk.sorted.kept);
+                if place.is_none() && pass == 0 && (passes > 1 || keeps) && bytes(i) <= left {
+                    left -= bytes(i);
+                    *place = Some(chunk);
                 }
                 done += chunks.rows(i) as u64;
                 (options.progress)(done, total);
@@ -260,14 +290,21 @@ impl<'a> GpuRun<'a> {
                 self.for_all_pages(step, None)?;
             }
         }
+        if sorter.is_some()
+            && keeps
+            && let Some(chunks) = ready.into_iter().collect()
+        {
+            self.gpu.kept.put(Kept { key, tiles: self.tiles.clone(), chunks });
+        }
         Ok(())
     }
 
     /// Makes room for the tiles that a chunk is the first to touch.
-    fn touch(&mut self, binner: &Binner, chunk: &Uploaded, slots: &mut [u32]) -> Result<()> {
-        let bits = binner.touched(self.gpu, &self.timer, chunk, slots.len())?;
+    fn touch(&mut self, sorter: &mut Sorter, chunk: &Uploaded) -> Result<()> {
+        let tiles = sorter.slots.len();
+        let bits = sorter.binner.touched(self.gpu, &self.timer, chunk, tiles)?;
         let first = self.tiles.len();
-        for (tile, slot) in slots.iter_mut().enumerate() {
+        for (tile, slot) in sorter.slots.iter_mut().enumerate() {
             let touched = bits[tile / 32] >> (tile % 32) & 1 == 1;
             let known = self.tiles.get(*slot as usize) == Some(&TileId(tile as u32));
             if touched && !known {
@@ -275,6 +312,11 @@ impl<'a> GpuRun<'a> {
                 self.tiles.push(TileId(tile as u32));
             }
         }
+        self.make_room(first)
+    }
+
+    /// Makes room for the state of the touched tiles from the `first` on.
+    fn make_room(&mut self, first: usize) -> Result<()> {
         if first == self.tiles.len() {
             return Ok(());
         }
@@ -296,13 +338,8 @@ impl<'a> GpuRun<'a> {
         Ok(())
     }
 
-    fn sort(
-        &self,
-        binner: &Binner,
-        scratch: &Scratch,
-        uploaded: Uploaded,
-        slots: &[u32],
-    ) -> Result<Ready> {
+    fn sort(&self, sorter: &Sorter, uploaded: Uploaded) -> Result<Ready> {
+        let Sorter { binner, scratch, slots } = sorter;
         let usage = wgpu::BufferUsages::STORAGE;
         let slots = self.gpu.filled("tiles' places", bytemuck::cast_slice(slots), usage)?;
         let places = (&slots, self.tiles.len());
@@ -315,9 +352,9 @@ impl<'a> GpuRun<'a> {
     fn draw(&self, chunk: &Ready) -> Result<()> {
         let fragments = self.programs.fragments;
         for from in (0..chunk.sorted.longest).step_by(fragments as usize) {
-            let mut part = chunk.uploaded.params;
-            part.from_fragment = from;
-            part.fragments = fragments;
+            // What is the frame's may be another replay's there: its seed, say.
+            let Params { rows, columns, .. } = chunk.uploaded.params;
+            let part = Params { rows, columns, from_fragment: from, fragments, ..self.params };
             self.for_all_pages(&self.programs.draw, Some((chunk, part)))?;
         }
         Ok(())

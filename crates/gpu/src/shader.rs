@@ -4,6 +4,7 @@
 use std::fmt::Write;
 
 use crate::loaders;
+use crate::unroll::unrolled;
 use screendoor_rop::shader;
 use screendoor_rop::{Constant, SHADERS, Shader};
 
@@ -49,7 +50,7 @@ pub(crate) fn named(name: &str) -> Shader {
 }
 
 /// The text of the program that `files` are, with those that they use, each once and before
-/// its users, behind `constants`. `mask` stands for the file that holds sets of up to
+/// its users, behind `constants`, loops over few samples written out. `mask` stands for the file that holds sets of up to
 /// `samples` samples.
 ///
 /// # Panics
@@ -63,7 +64,7 @@ pub(crate) fn program(files: &[Shader], samples: u32, constants: &[(String, Cons
     files.iter().for_each(|file| append(*file, samples, &mut done, &mut text));
     #[cfg(test)]
     let text = defect::plant(text);
-    text
+    unrolled(&text, samples)
 }
 
 /// Defects that tests plant into shaders.

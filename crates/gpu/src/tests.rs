@@ -174,9 +174,12 @@ fn shown(design: &Configured, trace: &Trace) -> String {
 /// One wrong bit or comparison in each part of the way. The designs that meet it, and whether
 /// threads are given samples.
 const DEFECTS: &[(&str, Threads, Defect)] = &[
-    ("lk", Threads::Pixel, ("x ^= x * 0xb82f1e52u", "x ^= x * 0xb82f1e53u")),
+    ("lk", Threads::Sample, ("x ^= x * 0xb82f1e52u", "x ^= x * 0xb82f1e53u")),
+    ("lk", Threads::Pixel, ("nested_round(n, 0xb82f1e52u)", "nested_round(n, 0xb82f1e50u)")),
+    ("lk", Threads::Pixel, ("0x73516240u", "0x73516204u")),
     ("lk", Threads::Pixel, ("<= depth[s]", "< depth[s]")),
-    ("lk", Threads::Pixel, ("depth[s] < depth[sample] ||", "depth[s] > depth[sample] ||")),
+    ("lk", Threads::Pixel, ("keys[t] < keys[s]", "keys[t] > keys[s]")),
+    ("lk", Threads::Pixel, ("place_bit(t) & counts;", "place_bit(t);")),
     ("lk", Threads::Pixel, ("surface_id += 1u", "surface_id += 2u")),
     ("lk", Threads::Pixel, ("covered |= s;", "covered |= s >> 1u;")),
     ("lk", Threads::Pixel, ("numbered += count;", "numbered += count & 6u;")),
@@ -258,6 +261,41 @@ fn a_planted_defect_is_found_whatever_part_it_is_in() {
         }
     }
     assert!(hidden.is_empty(), "hidden: {hidden:?}");
+}
+
+#[test]
+fn what_a_replay_leaves_sorted_serves_other_seeds_and_designs() {
+    let Ok(gpu) = Gpu::open(None) else { return };
+    let (first, other) = (trace(8), trace(8));
+    let plain = screendoor_rop::ReplayOptions {
+        implementation: Implementation::Reference,
+        ..Default::default()
+    };
+    // Whether a replay uploaded anything; its picture is held against the plain text's.
+    let uploads = |trace: &Trace, name: &str, (samples, seed), options: &GpuOptions<'_>| {
+        let design = configure(name, &[]).unwrap();
+        let (found, seconds, _) =
+            super::replay::replay(&gpu, &design, trace, samples, seed, options).unwrap();
+        let expected = design.replay(trace, samples, seed, &plain).unwrap();
+        assert_eq!(found.picture.hash(), expected.picture.hash(), "{name} {samples} {seed}");
+        seconds.upload > 0.0
+    };
+    for rows in [u64::MAX, 1000] {
+        let keep = GpuOptions { rows, ..GpuOptions::default() };
+        let case = |trace: &Trace, name: &str, of| uploads(trace, name, of, &keep);
+        assert!(case(&first, "lk", (8, 1)));
+        assert!(!case(&first.clone(), "lk", (8, 2)));
+        assert!(!case(&first, "systematic", (8, 1)));
+        assert!(!case(&first, "lk:method=depth-correction", (8, 1)));
+        // Other samples are sorted otherwise; another trace takes the place of the first.
+        assert!(case(&first, "lk", (4, 1)) && case(&first, "lk", (8, 1)));
+        assert!(case(&other, "lk", (8, 1)) && case(&first, "lk", (8, 1)));
+        // What is not to be kept is not, nor is what does not fit.
+        for asked in [GpuOptions { keep: false, ..keep }, GpuOptions { resident: 0, ..keep }] {
+            assert!(uploads(&other, "lk", (8, 1), &asked));
+            assert!(uploads(&other, "lk", (8, 1), &asked));
+        }
+    }
 }
 
 #[test]

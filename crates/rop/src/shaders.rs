@@ -9,6 +9,7 @@ pub const SHADERS: &[Shader] = &[
     shader!("contract/", "colour"),
     shader!("stochastic/", "comb"),
     shader!("stochastic/", "dither"),
+    shader!("stochastic/", "hits"),
     shader!("layered/", "layered"),
     shader!("layered/", "layers"),
     shader!("contract/", "opacity"),

@@ -274,6 +274,7 @@ fn choose(round: Round, passed: Mask, f: Fragment) -> Mask {
     let xi = dither_in_round(site.x, site.y, key, round.index, round.count_log2);
     // choice::Pairs.
     let pairs = exchanges(xi);
+    places_begin(passed, SORT);
     var written = MASK_NONE;
     for (var s = 0u; s < SAMPLES; s++) {
         if mask_contains(passed, s) {

@@ -100,7 +100,7 @@ fn inner_draw(number: u32, f: Fragment, row: u32) {
         return;
     }
     let written = choose(round_of(pass_kind.round), passed, f);
-    samples_write(f, row, written, DEPTH_BUFFER_BITS);
+    samples_write(row, written);
     occupied |= written;
 }
 

@@ -1,6 +1,6 @@
 // Twin of crates/rop/src/stochastic/tracked.rs: figure 7 of Laine and Karras (2011) with any reference values.
 // `references_clear`, `references_load`, `references_store`, `references_start`,
-// `references_begin` and `reference_of` are the design's.
+// `references_begin`, `reference_of`, `hits_begin` and `hit` are the design's.
 // uses: opacity pixel_order reference_value round samples surface
 
 var<private> pixel_id: u32;
@@ -65,12 +65,13 @@ fn choose(round: Round, passed: Mask, f: Fragment) -> Mask {
     let count = mask_count(s);
     let key = key_of(round);
     references_begin(round, key, opacity, numbered, count);
+    hits_begin(round, key, opacity);
+    places_begin(s, SORT);
     var written = MASK_NONE;
     for (var sample = 0u; sample < SAMPLES; sample++) {
         if mask_contains(s & passed, sample) {
             let place = place_among(s, sample, SORT);
-            let reference = reference_of(round, key, opacity, numbered, place);
-            if passes(opacity, reference) {
+            if hit(round, key, opacity, numbered, place) {
                 written |= mask_bit(sample);
             }
         }

@@ -140,6 +140,7 @@ impl Engine {
             Engine::Gpu(gpu, threads) => {
                 let options = GpuOptions {
                     threads: *threads,
+                    keep: options.keep,
                     progress: options.progress,
                     ..GpuOptions::default()
                 };

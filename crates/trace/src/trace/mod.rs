@@ -35,7 +35,7 @@ mod view;
 mod write;
 
 pub use batch::{Batch, MAX_BATCH_ROWS};
-pub use bins::{Bins, RowPlace, TileRows, Tiles, Wanted};
+pub use bins::{Bins, RowPlace, TileRows, Tiles, TraceMark, Wanted};
 pub use block::{BLOCK, Block};
 pub use cells::{ChannelColumn, CoverageColumn};
 pub use column::{Column, Native, Scalar, ValueType};

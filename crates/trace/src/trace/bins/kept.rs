@@ -10,6 +10,10 @@ use crate::trace::read::Trace;
 #[derive(Debug, Default)]
 pub(crate) struct Kept(Mutex<Option<Arc<Bins>>>);
 
+/// Tells an open trace from others.
+#[derive(Clone, Debug)]
+pub struct TraceMark(Weak<Kept>);
+
 /// The trace whose bins are kept: one at a time, so that open traces take no memory.
 static LAST: Mutex<Weak<Kept>> = Mutex::new(Weak::new());
 
@@ -33,6 +37,20 @@ impl Trace {
             Some(bins) => self.check_unchanged().map(|()| Some(bins)),
             None => Ok(None),
         }
+    }
+
+    /// What it is told by, and its clones are.
+    pub fn mark(&self) -> TraceMark {
+        TraceMark(Arc::downgrade(self.kept()))
+    }
+
+    /// Whether the mark is its own.
+    ///
+    /// # Errors
+    /// As [`Trace::kept_bins`].
+    pub fn is_marked(&self, mark: &TraceMark) -> Result<bool> {
+        let same = std::ptr::eq(mark.0.as_ptr(), Arc::as_ptr(self.kept()));
+        if same { self.check_unchanged().map(|()| true) } else { Ok(false) }
     }
 
     /// Keeps `bins` of all its fragments until they are forgotten, another trace's are kept,

@@ -34,6 +34,7 @@ pub use rows::TileRows;
 
 pub(super) use column::{Binned, BinnedColumn, Copies, Rows};
 pub(super) use kept::Kept;
+pub use kept::TraceMark;
 pub(super) use slabs::Slabs;
 
 use part::{LAST_CHUNK, Part};

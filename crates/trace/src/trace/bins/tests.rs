@@ -265,9 +265,13 @@ fn kept_bins_are_the_last_traces_own_and_go_with_it() {
     drop(other);
     assert_eq!(Arc::strong_count(&kept), 1);
 
+    let (mark, another) = (stored.mark(), open(PLAIN));
+    assert!(stored.clone().is_marked(&mark).unwrap() && !another.is_marked(&mark).unwrap());
+
     // What was sorted is not drawn once the file is another.
     stored.keep_bins(bins());
     std::fs::write(&path, [0; 100]).unwrap();
     let error = stored.kept_bins().unwrap_err().to_string();
     assert!(error.contains("another program has changed or cut it"), "{error}");
+    assert!(stored.is_marked(&mark).is_err() && !another.is_marked(&mark).unwrap());
 }
