@@ -32,16 +32,19 @@ pub(super) struct ResidueLanes<S: Simd, const N: usize> {
 }
 
 /// The words of a vector.
+#[inline(always)]
 fn words<S: Simd>(vector: u32x16<S>) -> [u32; 16] {
     let mut words = [0; 16];
     vector.store_slice(&mut words);
     words
 }
 
+#[inline(always)]
 fn signed<S: Simd>(vector: u32x16<S>) -> i32x16<S> {
     vector.bitcast()
 }
 
+#[inline(always)]
 fn unsigned<S: Simd>(vector: i32x16<S>) -> u32x16<S> {
     vector.bitcast()
 }
@@ -114,6 +117,7 @@ where
         }
     }
 
+    #[inline(always)]
     fn excess<S: Simd>(&self, lanes: &ResidueLanes<S, N>) -> [[f64; 3]; 16] {
         let sums = lanes.sums.map(|sum| words(unsigned(sum)));
         std::array::from_fn(|lane| self.shown_wrongly(&sums.map(|sum| sum[lane] as i32)))

@@ -16,6 +16,7 @@ pub(super) struct Share<S: Simd> {
 
 impl<S: Simd> Share<S> {
     /// That of a threshold.
+    #[inline(always)]
     pub(super) fn of_threshold(threshold: u32x16<S>, opaque: mask32x16<S>) -> Self {
         Share { low: threshold, whole: opaque }
     }

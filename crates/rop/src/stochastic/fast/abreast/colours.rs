@@ -115,13 +115,18 @@ fn four<S: Simd>(simd: S, window: &Window, who: [u32; 4]) -> [i32x4<S>; 3] {
 #[inline(always)]
 pub(super) fn sixteen<S: Simd>(simd: S, window: &Window, who: u32x16<S>) -> [f32x16<S>; 3] {
     let who = words_of(who);
-    let part = |i: usize| {
-        let colour = |i: usize| f32x4::from_slice(simd, window.colour(who[i]));
-        let pair = |i: usize| simd.combine_f32x4(colour(i), colour(i + 1));
-        simd.combine_f32x8(pair(4 * i), pair(4 * i + 2))
-    };
-    let (even, odd) = simd.deinterleave_f32x16(part(0), part(1));
-    let (later_even, later_odd) = simd.deinterleave_f32x16(part(2), part(3));
+    let [a, b, c, d] = [0, 4, 8, 12].map(
+        #[inline(always)]
+        |first: usize| {
+            let [a, b, c, d] = [first, first + 1, first + 2, first + 3].map(
+                #[inline(always)]
+                |i| f32x4::from_slice(simd, window.colour(who[i])),
+            );
+            simd.combine_f32x8(simd.combine_f32x4(a, b), simd.combine_f32x4(c, d))
+        },
+    );
+    let (even, odd) = simd.deinterleave_f32x16(a, b);
+    let (later_even, later_odd) = simd.deinterleave_f32x16(c, d);
     let (red, blue) = simd.deinterleave_f32x16(even, later_even);
     let (green, _) = simd.deinterleave_f32x16(odd, later_odd);
     [red, green, blue]
