@@ -3,7 +3,7 @@
 // uses: lanes
 
 var<workgroup> depths: array<u32, GROUP>;
-var<workgroup> tested: array<u32, GROUP>;
+var<workgroup> lanes_tested: array<u32, GROUP>;
 var<workgroup> longest: atomic<u32>;
 
 // The first thread of the pixel.
@@ -43,12 +43,12 @@ fn draw_lanes(
         let row = rows[min(range.x + i, max(range.y, 1u) - 1u)];
         let f = fragment(row);
         depths[thread] = lane_depth;
-        tested[thread] = select(0u, 1u, i < length && lane_test(f));
+        lanes_tested[thread] = select(0u, 1u, i < length && lane_test(f));
         workgroupBarrier();
         if i < length {
             var passed = MASK_NONE;
             for (var s = 0u; s < SAMPLES; s++) {
-                if tested[first_lane + s] == 1u {
+                if lanes_tested[first_lane + s] == 1u {
                     passed |= mask_bit(s);
                 }
             }
