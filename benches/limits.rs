@@ -226,7 +226,9 @@ fn main() {
             " %",
             || {
                 let first = replay(&trace, &one, false);
-                let sum = || drop(black_box(common::sum(&words)));
+                let sum = || {
+                    black_box(common::sum(&words));
+                };
                 let streamed = size_of_val(&words[..]) as f64 / seconds(sum);
                 100.0 * file as f64 / first / streamed
             },

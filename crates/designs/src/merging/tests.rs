@@ -88,9 +88,10 @@ fn the_bias_is_towards_the_far_colour() {
     let mut mean = [0.0; 3];
     for seed in 0..SEEDS {
         let design = design("", seed);
-        let [near, far, between] = [&near, &far, &between].map(|f| design.sheet(f));
-        let mut list = design.listed([design.merged(&near, &far, hash([seed]))].into_iter());
-        design.insert(&mut list, between, 0, &mut NoProbe);
+        let [near, far, between] = [&near, &far, &between].map(|f| design.rules.sheet(f));
+        let mut list =
+            design.rules.listed([design.rules.merged(&near, &far, hash([seed]))].into_iter());
+        design.rules.insert(&mut list, between, 0, &mut NoProbe);
         let [r, g, b] = design.resolve(SITE, &list, &[[0.0; 3]; 4]);
         mean = [mean[0] + r, mean[1] + g, mean[2] + b];
     }
@@ -109,6 +110,6 @@ fn the_cheapest_are_those_that_are_hidden() {
     // Behind what is opaque nothing matters, however far apart.
     let design = design("", 0);
     let layers = [(10, 0.5), (11, 1.0), (4000, 0.5)];
-    let sheet = |(z, a): (u32, f32)| design.sheet(&fragment(z << 20, 15, [1.0; 3], a));
-    assert_eq!(Listed::cheapest(&design.listed(layers.map(sheet).into_iter())), 1);
+    let sheet = |(z, a): (u32, f32)| design.rules.sheet(&fragment(z << 20, 15, [1.0; 3], a));
+    assert_eq!(Listed::cheapest(&design.rules.listed(layers.map(sheet).into_iter())), 1);
 }

@@ -3,7 +3,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, i32x16, mask32x16, u32x16};
 
-use crate::fast::mixed;
+use crate::fast::hashed_on;
 use crate::in_lanes::{LANES, Wide};
 use screendoor_trace::random::GOLDEN;
 use screendoor_trace::trace::{DepthPlane, Unorm32};
@@ -11,10 +11,9 @@ use screendoor_trace::trace::{DepthPlane, Unorm32};
 /// [`screendoor_trace::random::hash`].
 #[inline(always)]
 pub fn hashed<S: Simd, const N: usize>(simd: S, words: [u32x16<S>; N]) -> u32x16<S> {
-    let golden = u32x16::splat(simd, GOLDEN);
-    let mut h = golden;
+    let mut h = u32x16::splat(simd, GOLDEN);
     for word in words {
-        h = mixed(simd, (h ^ word) + golden);
+        h = hashed_on(simd, h, word);
     }
     h
 }

@@ -25,8 +25,8 @@ mod twin;
 
 pub use crate::lanes::{Count, Lanes, Width, levels};
 pub use abreast::{
-    Abreast, Counted, Met, NumberedAbreast, Ranks, STRIDE, Source, bit, exchanged_teeth, gather,
-    left_by, mixed, white,
+    Abreast, Counted, Met, NumberedAbreast, OneByOne, Ranks, STRIDE, Source, bit, exchanged_teeth,
+    gather, hashed_on, left_by, mixed, white,
 };
 pub use comb::teeth;
 pub use limit::{Limit, below};

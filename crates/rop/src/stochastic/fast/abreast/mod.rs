@@ -21,6 +21,7 @@ mod held;
 mod hits;
 mod lists;
 mod met;
+mod one_by_one;
 mod packed;
 #[cfg(test)]
 mod tests;
@@ -34,6 +35,7 @@ pub use comb::{exchanged_teeth, white};
 pub(super) use draw::{add, draw, picture};
 pub(super) use hits::nested;
 pub use met::{Abreast, Counted, Met, Source, gather};
+pub use one_by_one::OneByOne;
 pub use packed::{Ranks, STRIDE, bit, left_by};
 use screendoor_trace::random::{GOLDEN, MIX};
 pub use tracked::NumberedAbreast;
@@ -67,6 +69,6 @@ pub fn mixed<S: Simd>(simd: S, x: u32x16<S>) -> u32x16<S> {
 
 /// [`screendoor_trace::random::hash_on`] of one word in lanes.
 #[inline(always)]
-fn hashed_on<S: Simd>(simd: S, before: u32x16<S>, word: u32x16<S>) -> u32x16<S> {
+pub fn hashed_on<S: Simd>(simd: S, before: u32x16<S>, word: u32x16<S>) -> u32x16<S> {
     mixed(simd, (before ^ word) + u32x16::splat(simd, GOLDEN))
 }
