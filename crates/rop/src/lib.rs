@@ -20,7 +20,9 @@ pub use stochastic::{depth_bits, fast, tracked};
 
 pub use blended::accumulators::{Accumulators, Coverage};
 pub use blended::blend_buffer::BlendBuffer;
-pub use blended::moments::{MomentCount, Moments};
+pub use blended::functions;
+pub use blended::in_lanes::{SumLanes, Summed};
+pub use blended::moments::{Factors, MOST_MOMENTS, MomentCount, Moments, OfMoments};
 pub use blended::view_depth::ViewDepth;
 pub use contract::blueprint::Blueprint;
 pub use contract::colour::ColourStore;

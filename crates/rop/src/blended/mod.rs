@@ -2,5 +2,7 @@
 
 pub mod accumulators;
 pub(crate) mod blend_buffer;
+pub mod functions;
+pub(crate) mod in_lanes;
 pub(crate) mod moments;
 pub mod view_depth;

@@ -5,8 +5,13 @@
 //! where these planes stand, in the units of their formulas; or they take it from the view
 //! of the trace ([`View`]), in the units of its scene.
 
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f64x8, u32x16};
+
+use crate::blended::functions::{log1p, reals};
 use crate::contract::frame::Frame;
 use crate::contract::words::{Constant, Declaration};
+use crate::in_lanes::Wide;
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::param::{Typed, Values};
 use screendoor_trace::trace::{Projection, Unorm32, View};
@@ -126,6 +131,51 @@ impl ViewDepth {
             Projection::Orthographic => d * self.range,
         }
     }
+}
+
+/// The same of sixteen depths.
+impl ViewDepth {
+    /// [`ViewDepth::at`].
+    #[inline(always)]
+    pub fn at_lanes<S: Simd>(&self, simd: S, z: u32x16<S>) -> Wide<S> {
+        let [low, high] = self.beyond_near_lanes(simd, z);
+        [low + self.near, high + self.near]
+    }
+
+    /// [`ViewDepth::log_warped`].
+    #[inline(always)]
+    pub fn log_warped_lanes<S: Simd>(&self, simd: S, z: u32x16<S>) -> Wide<S> {
+        let number = |x: f64| f64x8::splat(simd, x);
+        let mut wide = self.beyond_near_lanes(simd, z);
+        for half in &mut wide {
+            let share = log1p(simd, *half / self.near) / self.log_far;
+            *half = number(2.0) * share.max(0.0).min(1.0) - 1.0;
+        }
+        wide
+    }
+
+    #[inline(always)]
+    fn beyond_near_lanes<S: Simd>(&self, simd: S, z: u32x16<S>) -> Wide<S> {
+        let mut wide = fraction_lanes(simd, z);
+        for d in &mut wide {
+            *d = match self.projection {
+                Projection::Perspective => {
+                    let far = self.near + self.range;
+                    let within = (f64x8::splat(simd, 1.0) - *d) * far + *d * self.near;
+                    *d * self.range * self.near / within
+                }
+                Projection::Orthographic => *d * self.range,
+            };
+        }
+        wide
+    }
+}
+
+/// [`fraction`] of sixteen.
+#[inline(always)]
+pub fn fraction_lanes<S: Simd>(simd: S, z: u32x16<S>) -> Wide<S> {
+    let [low, high] = reals(simd, z);
+    [low / f64::from(u32::MAX), high / f64::from(u32::MAX)]
 }
 
 /// A stored depth as a fraction: 0 at the near plane, 1 at the far one.

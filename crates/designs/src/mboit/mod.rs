@@ -3,10 +3,17 @@
 //! the powers of its depth; a second weighs each fragment by the transmittance before
 //! it that these moments tell.
 
+mod lanes;
+#[cfg(test)]
+mod tests;
+
+use fearless_simd::Level;
+use screendoor_rop::fast::{Count, Width};
+use screendoor_rop::in_lanes;
 use screendoor_rop::{
     Accumulators, Blueprint, ColourStore, Contents, Coverage, Family, Frame, Info, Layout,
-    MomentCount, Moments, OpaquePromise, OrderPromise, OverOpaque, Probe, Promises, Site,
-    Transparent, ViewDepth, accumulators, colour, over_opaque, view_depth,
+    MomentCount, Moments, OfMoments, OpaquePromise, OrderPromise, OverOpaque, Probe, Promises,
+    Site, TiledDesign, Transparent, ViewDepth, accumulators, colour, over_opaque, view_depth,
 };
 use screendoor_trace::error::Result;
 use screendoor_trace::param::{Typed, Values};
@@ -54,15 +61,30 @@ impl Blueprint for MomentBased {
     type At<const N: usize> = OverOpaque<MomentBasedAt<N>, N>;
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
-        let inner = MomentBasedAt {
-            moments: values.get(MOMENTS),
-            bias: values.get(BIAS),
-            overestimation: values.get(OVERESTIMATION),
+        let rules = Rules {
+            of_moments: OfMoments {
+                count: values.get(MOMENTS),
+                bias: values.get(BIAS),
+                overestimation: values.get(OVERESTIMATION),
+            },
             depth: ViewDepth::of(values, frame)?,
             coverage: accumulators::of(values),
             store: ColourStore::of(values, frame),
+            samples: N,
         };
+        let inner = MomentBasedAt { rules };
         Ok(OverOpaque::new(values, frame, over_opaque::of(values), inner))
+    }
+
+    fn fast<const N: usize>(
+        values: &Values,
+        frame: &Frame,
+        level: Level,
+    ) -> Result<Option<Box<dyn TiledDesign>>>
+    where
+        Count<N>: Width,
+    {
+        Ok(in_lanes::engine(Self::at::<N>(values, frame)?, level))
     }
 
     fn promises(values: &Values) -> Promises {
@@ -80,12 +102,17 @@ impl Blueprint for MomentBased {
 /// The sums, for pixels of `N` samples.
 #[derive(Clone, Debug)]
 pub struct MomentBasedAt<const N: usize> {
-    moments: MomentCount,
-    bias: f64,
-    overestimation: f64,
+    rules: Rules,
+}
+
+/// What is summed, whatever the number of samples.
+#[derive(Clone, Debug)]
+struct Rules {
+    of_moments: OfMoments,
     depth: ViewDepth,
     coverage: Coverage,
     store: ColourStore,
+    samples: usize,
 }
 
 /// What is kept of all fragments together.
@@ -107,9 +134,14 @@ const LEAST_TRANSMITTANCE: f64 = 1.0 / (1 << 24) as f64;
 /// alpha is left.
 const LEAST_SEEN: f64 = 1e-30;
 
-impl<const N: usize> MomentBasedAt<N> {
+impl Rules {
     fn moment_bits(&self) -> u32 {
-        32 * (self.moments.count() as u32 + 1)
+        32 * (self.of_moments.count.count() as u32 + 1)
+    }
+
+    /// How many sums a pixel has.
+    fn sums(&self) -> usize {
+        self.coverage.sums(self.samples)
     }
 }
 
@@ -135,11 +167,11 @@ impl<const N: usize> Transparent<N> for MomentBasedAt<N> {
     fn layout(&self) -> Layout {
         // Moments are of single precision whatever colours are: their matrix asks for it.
         let sums = [
-            (self.moment_bits(), "moments"),
-            (self.store.colour_bits(), "colour"),
-            (self.store.channel_bits(), "weight"),
+            (self.rules.moment_bits(), "moments"),
+            (self.rules.store.colour_bits(), "colour"),
+            (self.rules.store.channel_bits(), "weight"),
         ];
-        Layout::of(self.coverage.sums(N) as u32, &sums)
+        Layout::of(self.rules.sums() as u32, &sums)
     }
 
     fn clear(&self, _site: Site) -> Self::Pixel {
@@ -156,16 +188,18 @@ impl<const N: usize> Transparent<N> for MomentBasedAt<N> {
     ) {
         // One depth a fragment, that at the pixel's centre: it is shaded once. The
         // second pass reads moments sample by sample.
-        let z = self.depth.log_warped(fragment.depth.z);
-        let alpha = self.coverage.alpha(fragment, N);
-        let touched = self.coverage.touched(fragment.coverage);
+        let rules = &self.rules;
+        let OfMoments { count: moments, bias, overestimation } = rules.of_moments;
+        let z = rules.depth.log_warped(fragment.depth.z);
+        let alpha = rules.coverage.alpha(fragment, N);
+        let touched = rules.coverage.touched(fragment.coverage);
         let count = touched.count();
-        let sums = pixel.touch(self.coverage.sums(N));
+        let sums = pixel.touch(rules.sums());
         probe.written(fragment.coverage);
         if pass == 0 {
             let absorbance = -libm::log((1.0 - f64::from(alpha)).max(LEAST_TRANSMITTANCE));
-            touched.iter().for_each(|s| sums[s].moments.add(self.moments, absorbance, z));
-            return probe.state(self.moment_bits() * count, self.moment_bits() * count);
+            touched.iter().for_each(|s| sums[s].moments.add(moments, absorbance, z));
+            return probe.state(rules.moment_bits() * count, rules.moment_bits() * count);
         }
         // Neighbouring samples mostly hold the same moments.
         let mut last: Option<(Moments, f32)> = None;
@@ -175,18 +209,18 @@ impl<const N: usize> Transparent<N> for MomentBasedAt<N> {
                 Some((moments, weight)) if moments == sums.moments => weight,
                 _ => {
                     let transmittance =
-                        sums.moments.transmittance(self.moments, z, self.bias, self.overestimation);
+                        sums.moments.transmittance(moments, z, bias, overestimation);
                     (f64::from(alpha) * transmittance.max(LEAST_SEEN)) as f32
                 }
             };
             last = Some((sums.moments, weight));
             for (sum, c) in sums.colour.iter_mut().zip(fragment.colour) {
-                *sum = self.store.channel(*sum + weight * c);
+                *sum = rules.store.channel(*sum + weight * c);
             }
-            sums.weight = self.store.channel(sums.weight + weight);
+            sums.weight = rules.store.channel(sums.weight + weight);
         }
-        let texel = self.store.texel_bits();
-        probe.state((self.moment_bits() + texel) * count, texel * count);
+        let texel = rules.store.texel_bits();
+        probe.state((rules.moment_bits() + texel) * count, texel * count);
     }
 
     fn resolve(&self, _site: Site, pixel: &Self::Pixel, behind: &[[f32; 3]; N]) -> [f64; 3] {

@@ -13,7 +13,12 @@
 //! evaluated in double precision, so that what is seen is the method and its state
 //! and not one way to round on.
 
+mod lanes;
+mod newton;
+
 use arrayvec::ArrayVec;
+
+pub use lanes::{Factors, OfMoments};
 
 screendoor_trace::options! {
     /// How many moments beside the zeroth are kept.
@@ -46,15 +51,28 @@ impl MomentCount {
             MomentCount::Eight => (5e-5, &[0.75, 0.676_666_67, 0.63, 0.600_303_03]),
         }
     }
+
+    /// How far moments are drawn with a bias of so many units, and towards which.
+    fn pull(self, bias: f64) -> (f64, [f64; MOST_MOMENTS]) {
+        let (unit, even) = self.bias();
+        let mut towards = [0.0; MOST_MOMENTS];
+        for (k, moment) in even.iter().enumerate() {
+            towards[2 * k + 2] = *moment;
+        }
+        ((bias * unit).min(1.0), towards)
+    }
 }
 
 /// The most moments, and the largest degree of K.
 const MOST: usize = 8;
 const DEGREE: usize = MOST / 2;
 
+/// As many sums are kept, whatever the number of moments.
+pub const MOST_MOMENTS: usize = MOST + 1;
+
 /// Sums of absorbance, times the powers of the depth at which it lies.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
-pub struct Moments([f32; MOST + 1]);
+pub struct Moments([f32; MOST_MOMENTS]);
 
 impl Moments {
     /// Adds `absorbance` (the negative logarithm of a transmittance) at depth `z` in
@@ -74,6 +92,16 @@ impl Moments {
         f64::from(self.0[0])
     }
 
+    /// They, the zeroth first.
+    pub fn sums(&self) -> [f32; MOST_MOMENTS] {
+        self.0
+    }
+
+    /// Of such sums.
+    pub fn of(sums: [f32; MOST_MOMENTS]) -> Self {
+        Moments(sums)
+    }
+
     /// The transmittance of what lies before `z`, and of the share `overestimation` of
     /// what may lie at `z`. `bias` counts in units of the publication's.
     pub fn transmittance(&self, count: MomentCount, z: f64, bias: f64, overestimation: f64) -> f64 {
@@ -81,12 +109,10 @@ impl Moments {
         if total <= 0.0 {
             return 1.0;
         }
-        let (unit, even) = count.bias();
-        let pull = (bias * unit).min(1.0);
-        let mut b = [1.0; MOST + 1];
+        let (pull, towards) = count.pull(bias);
+        let mut b = [1.0; MOST_MOMENTS];
         for (k, (b, sum)) in b.iter_mut().zip(self.0).enumerate().skip(1).take(count.count()) {
-            let towards = if k % 2 == 0 { even[k / 2 - 1] } else { 0.0 };
-            *b = (1.0 - pull) * f64::from(sum) / total + pull * towards;
+            *b = (1.0 - pull) * f64::from(sum) / total + pull * towards[k];
         }
         libm::exp(-total * share_before(&b[..=count.count()], z, overestimation))
     }

@@ -2,11 +2,16 @@
 //! 2013): the mean of all fragments, weighted by a guess from depth and alpha of how
 //! much of each is seen, over the background by the exact transmittance.
 
+mod lanes;
+
+use fearless_simd::Level;
+use screendoor_rop::fast::{Count, Width};
+use screendoor_rop::in_lanes;
 use screendoor_rop::shader;
 use screendoor_rop::{
     Accumulators, Blueprint, ColourStore, Contents, Coverage, Declaration, Family, Frame, Info,
     Layout, OnDevice, OpaquePromise, OrderPromise, OverOpaque, PixelWords, Port, Probe, Promises,
-    Site, Transparent, ViewDepth, accumulators, colour, over_opaque, view_depth,
+    Site, TiledDesign, Transparent, ViewDepth, accumulators, colour, over_opaque, view_depth,
 };
 use screendoor_trace::error::Result;
 use screendoor_trace::param::{Typed, Values};
@@ -70,13 +75,26 @@ impl Blueprint for WeightedBlended {
     type At<const N: usize> = OverOpaque<WeightedBlendedAt<N>, N>;
 
     fn at<const N: usize>(values: &Values, frame: &Frame) -> Result<Self::At<N>> {
-        let inner = WeightedBlendedAt {
+        let rules = Rules {
             weight: values.get(WEIGHT),
             depth: ViewDepth::of(values, frame)?,
             coverage: accumulators::of(values),
             store: ColourStore::of(values, frame),
+            samples: N,
         };
+        let inner = WeightedBlendedAt { rules };
         Ok(OverOpaque::new(values, frame, over_opaque::of(values), inner))
+    }
+
+    fn fast<const N: usize>(
+        values: &Values,
+        frame: &Frame,
+        level: Level,
+    ) -> Result<Option<Box<dyn TiledDesign>>>
+    where
+        Count<N>: Width,
+    {
+        Ok(in_lanes::engine(Self::at::<N>(values, frame)?, level))
     }
 
     const PORTED: bool = true;
@@ -99,10 +117,24 @@ impl Blueprint for WeightedBlended {
 /// The sums, for pixels of `N` samples.
 #[derive(Clone, Debug)]
 pub struct WeightedBlendedAt<const N: usize> {
+    rules: Rules,
+}
+
+/// What is summed, whatever the number of samples.
+#[derive(Clone, Debug)]
+struct Rules {
     weight: Weight,
     depth: ViewDepth,
     coverage: Coverage,
     store: ColourStore,
+    samples: usize,
+}
+
+impl Rules {
+    /// How many sums a pixel has.
+    fn sums(&self) -> usize {
+        self.coverage.sums(self.samples)
+    }
 }
 
 /// What is kept of all fragments together.
@@ -135,10 +167,11 @@ impl<const N: usize> Transparent<N> for WeightedBlendedAt<N> {
     type Pixel = Accumulators<WeightedSums>;
 
     fn layout(&self) -> Layout {
-        let channel = self.store.channel_bits();
+        let store = self.rules.store;
+        let channel = store.channel_bits();
         let sums =
-            [(self.store.colour_bits(), "colour"), (channel, "weight"), (channel, "transmittance")];
-        Layout::of(self.coverage.sums(N) as u32, &sums)
+            [(store.colour_bits(), "colour"), (channel, "weight"), (channel, "transmittance")];
+        Layout::of(self.rules.sums() as u32, &sums)
     }
 
     fn clear(&self, _site: Site) -> Self::Pixel {
@@ -154,12 +187,13 @@ impl<const N: usize> Transparent<N> for WeightedBlendedAt<N> {
         probe: &mut P,
     ) {
         // Shaded once a fragment, at the pixel's centre, whatever the samples.
-        let alpha = self.coverage.alpha(fragment, N);
-        let weight = self.weight.of(&self.depth, fragment.depth.z, alpha);
+        let rules = &self.rules;
+        let alpha = rules.coverage.alpha(fragment, N);
+        let weight = rules.weight.of(&rules.depth, fragment.depth.z, alpha);
         let weighted = (weight * f64::from(alpha)) as f32;
-        let touched = self.coverage.touched(fragment.coverage);
-        let store = self.store;
-        let sums = pixel.touch(self.coverage.sums(N));
+        let touched = rules.coverage.touched(fragment.coverage);
+        let store = rules.store;
+        let sums = pixel.touch(rules.sums());
         for s in touched.iter() {
             let sums = &mut sums[s];
             for (sum, c) in sums.colour.iter_mut().zip(fragment.colour) {
@@ -188,13 +222,13 @@ impl<const N: usize> Transparent<N> for WeightedBlendedAt<N> {
 
 impl<const N: usize> OnDevice<Accumulators<WeightedSums>> for WeightedBlendedAt<N> {
     fn declare(&self, to: &mut Declaration) {
-        let sums = self.coverage.sums(N) as u32;
+        let sums = self.rules.sums() as u32;
         to.field("TOUCHED", 1);
         to.field("SUM_COLOUR", 3 * sums);
         to.field("SUM_WEIGHT", sums);
         to.field("SUM_THROUGH", sums);
         to.iterations(sums);
-        self.depth.declare(to);
+        self.rules.depth.declare(to);
     }
 
     fn read(&self, _: Site, from: &PixelWords<'_>) -> Accumulators<WeightedSums> {
@@ -241,12 +275,14 @@ mod tests {
     fn a_pixel_by_hand() {
         // Two fragments of weight 1: red at 0.5, green at 0.25. The mean by alpha is
         // (2/3, 1/3, 0), the transmittance 3/8.
-        let design = WeightedBlendedAt::<1> {
+        let rules = Rules {
             weight: Weight::One,
             depth: ViewDepth::new(1.0, 1.0, Projection::Orthographic),
             coverage: Coverage::Sample,
             store: ColourStore::single(),
+            samples: 1,
         };
+        let design = WeightedBlendedAt::<1> { rules };
         let mut pixel = Accumulators::default();
         let site = Site { x: 0, y: 0 };
         for (colour, alpha) in [([1.0, 0.0, 0.0], 0.5), ([0.0, 1.0, 0.0], 0.25)] {
