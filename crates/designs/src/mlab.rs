@@ -137,7 +137,7 @@ mod tests {
         let site = Site { x: 0, y: 0 };
         let resolve = |fragments: &[Fragment]| {
             use screendoor_rop::Design;
-            design.resolve(site, &draw_pixel(&design, site, fragments))[0]
+            Design::resolve(&design, site, &draw_pixel(&design, site, fragments))[0]
         };
         let (a, b, c) = (fragment(1, 1.0, 0.5), fragment(2, 0.0, 0.5), fragment(3, 1.0, 0.25));
         // 0.5 + 0.5·(0 + 0.5·(0.25 + 0.75·1)) = 0.75, exactly, while the last two that are

@@ -1,5 +1,10 @@
 //! `adaptive` with sixteen pixels side by side.
 
+#![allow(
+    clippy::needless_range_loop,
+    reason = "loops over channels and halves are unrolled into registers; closures would be called"
+)]
+
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, f64x8, mask32x16, u32x16, u64x8};
 use screendoor_rop::in_lanes::{HasLanes, InLanes, LANES, Met, Told, Wide, widened, words};
@@ -46,7 +51,7 @@ impl AdaptiveInLanes {
         for (column, passes) in passes.iter_mut().enumerate() {
             let covers = (node.coverage & u32x16::splat(simd, 1 << column)).simd_ne(0);
             *passes = covers.select(*passes * node.transmittance, *passes);
-            sum = sum + *passes;
+            sum += *passes;
         }
         let mean = sum / passes.len() as f32;
         let all = mean.simd_ge(f32x16::splat(simd, 1.0));
@@ -152,7 +157,7 @@ impl AdaptiveInLanes {
                 let hides = (node.coverage & bit).simd_ne(0) & node.depth.simd_lt(met.z);
                 let wide = widened(simd, hides.select(node.transmittance, one));
                 for half in 0..2 {
-                    passes[half] = passes[half] * wide[half];
+                    passes[half] *= wide[half];
                 }
             }
             let covers = (coverage & bit).simd_ne(0).to_bitmask();

@@ -4,6 +4,11 @@
 //! Samples of a pixel that hold the same moments share it. What is left, of all sixteen pixels,
 //! is put together into full vectors.
 
+#![allow(
+    clippy::needless_range_loop,
+    reason = "loops over channels and halves are unrolled into registers; closures would be called"
+)]
+
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, f64x8, mask32x16, u32x16};
 use screendoor_rop::functions::{exp, log};

@@ -4,6 +4,11 @@
 //! coming and the merging of two. What merging costs is worked out anew each time: to look for
 //! the neighbours of a layer whose place differs from lane to lane takes longer.
 
+#![allow(
+    clippy::needless_range_loop,
+    reason = "loops over channels and halves are unrolled into registers; closures would be called"
+)]
+
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, f64x8, i32x16, mask32x16, u32x16};
 use screendoor_rop::Probe;
@@ -221,7 +226,7 @@ impl MergingInLanes {
             best = better.select(u32x16::splat(simd, i as u32), best);
             least = better.select(cost, least);
             let opaque = a.alpha * (counted(simd, a.coverage) / self.rules.samples as f32);
-            through = through * (f32x16::splat(simd, 1.0) - opaque);
+            through *= f32x16::splat(simd, 1.0) - opaque;
         }
         best
     }
@@ -481,7 +486,7 @@ impl InLanes for MergingInLanes {
         }
         for c in 0..3 {
             for half in 0..2 {
-                sums[c][half] = sums[c][half] / self.rules.samples as f64;
+                sums[c][half] /= self.rules.samples as f64;
             }
         }
         if crossing.any_true() {

@@ -1,5 +1,10 @@
 //! `wboit` with sixteen pixels side by side.
 
+#![allow(
+    clippy::needless_range_loop,
+    reason = "loops over channels and halves are unrolled into registers; closures would be called"
+)]
+
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, f64x8, u32x16};
 use screendoor_rop::in_lanes::{HasLanes, InLanes, LANES, Met, Told, Wide, widened};

@@ -9,6 +9,11 @@
 //! What is done for a fragment is compiled once a design for all sample counts up to
 //! [`MOST_SAMPLES`].
 
+#![allow(
+    clippy::needless_range_loop,
+    reason = "loops over channels and halves are unrolled into registers; closures would be called"
+)]
+
 mod engine;
 mod groups;
 mod kernel;

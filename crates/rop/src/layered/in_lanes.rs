@@ -1,5 +1,10 @@
 //! [`Bounded`] lists of layers of sixteen pixels.
 
+#![allow(
+    clippy::needless_range_loop,
+    reason = "loops over channels and halves are unrolled into registers; closures would be called"
+)]
+
 use std::marker::PhantomData;
 
 use fearless_simd::prelude::*;
@@ -38,7 +43,7 @@ impl<E: Eviction> BoundedInLanes<E> {
         let (coverage, alpha) = self.columns.place(simd, met);
         let mut colour = met.colour;
         for c in 0..3 {
-            colour[c] = colour[c] * alpha;
+            colour[c] *= alpha;
         }
         let transmittance = f32x16::splat(simd, 1.0) - alpha;
         self.columns.stored(simd, LayerLanes { depth: met.z, coverage, colour, transmittance })

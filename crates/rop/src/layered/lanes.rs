@@ -1,5 +1,10 @@
 //! Layers of sixteen pixels.
 
+#![allow(
+    clippy::needless_range_loop,
+    reason = "loops over channels and halves are unrolled into registers; closures would be called"
+)]
+
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, f64x8, mask32x16, u32x16};
 
@@ -324,7 +329,7 @@ impl ColumnsInLanes {
 fn divide<S: Simd>(sums: &mut [Wide<S>; 3], count: usize) {
     for c in 0..3 {
         for half in 0..2 {
-            sums[c][half] = sums[c][half] / count as f64;
+            sums[c][half] /= count as f64;
         }
     }
 }

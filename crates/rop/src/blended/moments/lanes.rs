@@ -1,6 +1,11 @@
 //! Transmittance from moments of many sums side by side. What depends on the moments alone is
 //! found once.
 
+#![allow(
+    clippy::needless_range_loop,
+    reason = "loops over channels and halves are unrolled into registers; closures would be called"
+)]
+
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, f64x8};
 

@@ -1,6 +1,11 @@
 //! Roots of eight polynomials side by side: the steps of the plain text, and whoever has done
 //! with them stands still until all have.
 
+#![allow(
+    clippy::needless_range_loop,
+    reason = "loops over channels and halves are unrolled into registers; closures would be called"
+)]
+
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f64x8, mask64x8};
 
