@@ -354,9 +354,8 @@ impl InLanes for MomentsInLanes {
                     through[half] = exp(simd, -through[half]);
                     let opacity = f64x8::splat(simd, 1.0) - through[half];
                     let any = weight[half].simd_gt(nought);
-                    for c in 0..3 {
-                        let seen = colour[c][half] / weight[half] * opacity;
-                        colour[c][half] = any.select(seen, nought);
+                    for c in &mut colour {
+                        c[half] = any.select(c[half] / weight[half] * opacity, nought);
                     }
                 }
                 (colour, through)

@@ -127,8 +127,8 @@ impl InLanes for WeightedInLanes {
         let [low, high] = self.0.weights(simd, met.z, &wide);
         let weighted = simd.narrow_f64x8(low * wide[0], high * wide[1]);
         let mut colour = met.colour;
-        for c in 0..3 {
-            colour[c] = weighted * colour[c];
+        for c in &mut colour {
+            *c *= weighted;
         }
         let through = f32x16::splat(simd, 1.0) - alpha;
         let touched = coverage.touched_lanes(simd, met);
@@ -165,9 +165,8 @@ impl InLanes for WeightedInLanes {
                 for half in 0..2 {
                     let opacity = f64x8::splat(simd, 1.0) - transmittance[half];
                     let any = weight[half].simd_gt(nought);
-                    for c in 0..3 {
-                        let seen = colour[c][half] / weight[half] * opacity;
-                        colour[c][half] = any.select(seen, nought);
+                    for c in &mut colour {
+                        c[half] = any.select(c[half] / weight[half] * opacity, nought);
                     }
                 }
                 (colour, transmittance)

@@ -224,8 +224,8 @@ impl<S: Simd> Hankels<S> {
         let mut y = [power; DEGREE + 1];
         for i in 0..=D {
             let mut sum = f64x8::splat(simd, -0.0);
-            for k in 0..i {
-                sum += y[k] * self.l[i][k];
+            for (y, l) in y.iter().zip(&self.l[i]).take(i) {
+                sum += *y * *l;
             }
             y[i] = power - sum;
             power *= x;
@@ -238,8 +238,8 @@ impl<S: Simd> Hankels<S> {
     fn mass<const D: usize>(&self, simd: S, x: f64x8<S>) -> f64x8<S> {
         let y = self.orthogonal::<D>(simd, x);
         let mut sum = f64x8::splat(simd, -0.0);
-        for i in 0..=D {
-            sum += y[i] * y[i] / self.d[i];
+        for (y, d) in y.iter().zip(&self.d).take(D + 1) {
+            sum += *y * *y / *d;
         }
         f64x8::splat(simd, 1.0) / sum
     }
@@ -256,8 +256,8 @@ impl<S: Simd> Hankels<S> {
         }
         for i in (0..=D).rev() {
             let mut sum = f64x8::splat(simd, -0.0);
-            for k in i + 1..=D {
-                sum += self.l[k][i] * q[k];
+            for (row, q) in self.l.iter().zip(&q).take(D + 1).skip(i + 1) {
+                sum += row[i] * *q;
             }
             q[i] -= sum;
         }

@@ -35,9 +35,10 @@ pub(super) fn roots<S: Simd, const D: usize>(
     let none = Root { x: f64x8::splat(simd, 0.0), there: mask64x8::splat(simd, false) };
     let mut chain = [*p; DEGREE + 1];
     for k in 1..=D {
-        for v in 0..ABREAST {
+        let last = chain[k - 1];
+        for (p, last) in chain[k].iter_mut().zip(&last) {
             for i in 0..=D - k {
-                chain[k][v][i] = chain[k - 1][v][i + 1] * (i + 1) as f64;
+                p[i] = last[i + 1] * (i + 1) as f64;
             }
         }
     }
@@ -140,8 +141,8 @@ fn newton<S: Simd, const L: usize, const C: usize>(
     }
     for _ in 0..80 {
         let mut any = moving[0];
-        for c in 1..C {
-            any |= moving[c];
+        for more in &moving[1..] {
+            any |= *more;
         }
         if !any.any_true() {
             break;
