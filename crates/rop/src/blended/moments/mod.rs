@@ -267,7 +267,8 @@ fn root_between<const D: usize>(
             low = x;
         }
         let newton = x - value / slope(x);
-        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        // At an end, too: what does not move any more has arrived there.
+        let next = if newton >= low && newton <= high { newton } else { 0.5 * (low + high) };
         if (next - x).abs() <= 1e-14 * (1.0 + x.abs()) {
             break;
         }

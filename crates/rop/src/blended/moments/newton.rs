@@ -159,7 +159,8 @@ fn newton<S: Simd, const L: usize, const C: usize>(
             interval.high = beyond.select(interval.high, x);
             interval.low = beyond.select(x, interval.low);
             let step = x - value / slope;
-            let within = step.simd_gt(interval.low) & step.simd_lt(interval.high);
+            // At an end, too: there it has arrived.
+            let within = step.simd_ge(interval.low) & step.simd_le(interval.high);
             let next = within.select(step, half * (interval.low + interval.high));
             let near = (next - x).abs().simd_le(number(1e-14) * (one + x.abs()));
             moving[c] &= !near;
