@@ -63,7 +63,7 @@ fn a_memory_limit_changes_no_bit() {
     let trace = trace(&header, &fragments);
     for design in all_variants() {
         let expected = picture(&design, &trace, 4, 0).hash();
-        for memory in [1 << 30, 300_000, 60_000, 30_000] {
+        for memory in [1 << 30, 300_000, 60_000, 40_000] {
             let options = ReplayOptions { memory, ..ReplayOptions::default() };
             let replayed = design.replay(&trace, 4, 0, &options).unwrap();
             assert_eq!(replayed.picture.hash(), expected, "{} in {memory}", design.label());
