@@ -219,7 +219,8 @@ impl<const N: usize> FastResidual<N> {
         match self.flaw {
             None => {}
             Some(LaneFlaw::Fragments) => lanes.fragments ^= word,
-            Some(LaneFlaw::Depth) => lanes.z ^= word,
+            // What a pixel holds is told with six digits of depth.
+            Some(LaneFlaw::Depth) => lanes.z ^= word << 16,
             Some(LaneFlaw::Mass) => lanes.mass ^= word,
             Some(LaneFlaw::Sum(c)) => lanes.sums[c] ^= signed(word),
             Some(LaneFlaw::Held(c, s)) => lanes.fixed[c][s] ^= signed(word),
