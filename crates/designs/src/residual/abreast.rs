@@ -215,12 +215,12 @@ pub(super) enum LaneFlaw {
 #[cfg(test)]
 impl<const N: usize> FastResidual<N> {
     fn plant<S: Simd>(&self, simd: S, here: mask32x16<S>, lanes: &mut ResidueLanes<S, N>) {
-        let word = here.select(u32x16::splat(simd, 1), u32x16::splat(simd, 0));
+        // What a pixel holds is told with few digits: a bit that shows.
+        let word = here.select(u32x16::splat(simd, 1 << 16), u32x16::splat(simd, 0));
         match self.flaw {
             None => {}
             Some(LaneFlaw::Fragments) => lanes.fragments ^= word,
-            // What a pixel holds is told with six digits of depth.
-            Some(LaneFlaw::Depth) => lanes.z ^= word << 16,
+            Some(LaneFlaw::Depth) => lanes.z ^= word,
             Some(LaneFlaw::Mass) => lanes.mass ^= word,
             Some(LaneFlaw::Sum(c)) => lanes.sums[c] ^= signed(word),
             Some(LaneFlaw::Held(c, s)) => lanes.fixed[c][s] ^= signed(word),
