@@ -13,7 +13,8 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, f64x8, i32x16, mask32x16, u32x16};
 use screendoor_rop::Probe;
 use screendoor_rop::in_lanes::{
-    HasLanes, InLanes, LANES, Met, Told, Wide, depth_at, hashed, reaches_ends, widened, words,
+    HasLanes, InLanes, LANES, Met, Told, Wide, counted, depth_at, hashed, reaches_ends, widened,
+    words,
 };
 use screendoor_rop::layers::DEPTH_BITS;
 use screendoor_trace::tile::TILE_PIXELS;
@@ -77,12 +78,6 @@ impl<S: Simd> Sheets<S> {
         }
         differ | self.alpha.simd_ne(other.alpha)
     }
-}
-
-/// How many samples sets have.
-#[inline(always)]
-fn counted<S: Simd>(simd: S, sets: u32x16<S>) -> f32x16<S> {
-    simd.cvt_f32_u32x16(simd.count_ones_u32x16(sets))
 }
 
 /// [`Shown`](super::Shown) of sixteen pairs.

@@ -4,7 +4,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, f64x8, mask32x16, u32x16};
 
 use crate::blended::accumulators::{Accumulators, Coverage};
-use crate::in_lanes::{LANES, Met, Wide, widened, words};
+use crate::in_lanes::{LANES, Met, Wide, counted, widened, words};
 use crate::resolve::box_filter;
 use screendoor_trace::tile::TILE_PIXELS;
 
@@ -197,10 +197,7 @@ impl Coverage {
     pub fn alpha_lanes<S: Simd>(self, simd: S, met: &Met<S>, samples: usize) -> f32x16<S> {
         match self {
             Coverage::Sample => met.alpha,
-            Coverage::Share => {
-                let count = simd.cvt_f32_u32x16(simd.count_ones_u32x16(met.coverage));
-                met.alpha * (count / samples as f32)
-            }
+            Coverage::Share => met.alpha * (counted(simd, met.coverage) / samples as f32),
         }
     }
 }

@@ -32,7 +32,7 @@ use screendoor_trace::tile::TILE_PIXELS;
 
 pub use engine::engine;
 pub use met::Met;
-pub use numbers::{depth_at, hashed, reaches_ends, widened, words};
+pub use numbers::{counted, depth_at, hashed, reaches_ends, widened, words};
 pub use told::Told;
 
 /// Pixels that are drawn side by side.

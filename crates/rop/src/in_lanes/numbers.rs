@@ -18,6 +18,12 @@ pub fn hashed<S: Simd, const N: usize>(simd: S, words: [u32x16<S>; N]) -> u32x16
     h
 }
 
+/// How many samples sets have.
+#[inline(always)]
+pub fn counted<S: Simd>(simd: S, sets: u32x16<S>) -> f32x16<S> {
+    simd.cvt_f32_u32x16(simd.count_ones_u32x16(sets))
+}
+
 /// The words of a vector.
 #[inline(always)]
 pub fn words<S: Simd>(vector: u32x16<S>) -> [u32; LANES] {

@@ -10,7 +10,7 @@ use fearless_simd::{Simd, f32x16, f64x8, mask32x16, u32x16};
 
 use crate::contract::colour::ColourStore;
 use crate::contract::event::Probe;
-use crate::in_lanes::{LANES, Met, Told, Wide, widened, words};
+use crate::in_lanes::{LANES, Met, Told, Wide, counted, widened, words};
 use crate::layered::layers::{Columns, Coverage, DEPTH_BITS, Layer};
 use screendoor_trace::trace::{SampleMask, Unorm32};
 
@@ -86,12 +86,6 @@ impl<S: Simd> LayerLanes<S> {
             s.transmittance * (mine + shared * d.transmittance) + theirs * d.transmittance;
         merged
     }
-}
-
-/// How many samples sets have.
-#[inline(always)]
-fn counted<S: Simd>(simd: S, sets: u32x16<S>) -> f32x16<S> {
-    simd.cvt_f32_u32x16(simd.count_ones_u32x16(sets))
 }
 
 /// The layers of sixteen pixels, near ones first.

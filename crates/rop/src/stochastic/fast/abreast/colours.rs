@@ -3,10 +3,10 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x4, f32x16, f64x2, i32x4, u32x4, u32x16};
 
+use crate::in_lanes::words as words_of;
 use crate::lanes::{Count, Width};
 use crate::resolve::box_filter;
 use crate::stochastic::fast::abreast::lists::LANES;
-use crate::stochastic::fast::abreast::met::words_of;
 use crate::stochastic::fast::abreast::window::{NOBODY, Window};
 use crate::stochastic::fast::sampler::FastSampler;
 use crate::stochastic::fast::state::FastTile;

@@ -48,9 +48,9 @@ pub(super) fn exchanged<S: Simd>(simd: S, set: u32x16<S>, exchanges: u32x16<S>) 
 mod tests {
     use super::*;
     use crate::Dither;
+    use crate::in_lanes::words as words_of;
     use crate::lanes::levels;
     use crate::stochastic::comb;
-    use crate::stochastic::fast::abreast::met::words_of;
     use fearless_simd::Level;
     use screendoor_trace::random::Stream;
 

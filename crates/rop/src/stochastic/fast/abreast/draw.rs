@@ -4,6 +4,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, i32x16, u32x16};
 
 use crate::contract::event::Sum;
+use crate::in_lanes::words as words_of;
 use crate::lanes::{Count, Width};
 use crate::stochastic::fast::abreast::colours::{colour, mean, sixteen};
 use crate::stochastic::fast::abreast::depths::Depths;
@@ -11,7 +12,7 @@ use crate::stochastic::fast::abreast::depths::Depths;
 use crate::stochastic::fast::abreast::held::flawed;
 use crate::stochastic::fast::abreast::held::{Drawn, Held};
 use crate::stochastic::fast::abreast::lists::{COVERED, Group, LANES, words};
-use crate::stochastic::fast::abreast::met::{Abreast, Counted, Met, words_of};
+use crate::stochastic::fast::abreast::met::{Abreast, Counted, Met};
 use crate::stochastic::fast::abreast::packed::{bit, packed, unpack};
 use crate::stochastic::fast::abreast::window::{OPAQUE, Window};
 use crate::stochastic::fast::sampler::FastSampler;

@@ -6,6 +6,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, f32x16, i32x16, mask32x16, u32x16};
 
 use crate::contract::event::Probe;
+use crate::in_lanes::words as words_of;
 use crate::stochastic::fast::abreast::packed::{count, left_by};
 use crate::stochastic::fast::tally::Tally;
 use crate::stochastic::methods::Round;
@@ -106,14 +107,6 @@ pub fn gather<S: Simd>(simd: S, pixels: &[u8; 16], word: impl Fn(usize) -> u32) 
         *to = word(usize::from(*pixel));
     }
     u32x16::from_slice(simd, &words)
-}
-
-/// The words of a vector.
-#[inline(always)]
-pub(super) fn words_of<S: Simd>(vector: u32x16<S>) -> [u32; 16] {
-    let mut words = [0; 16];
-    vector.store_slice(&mut words);
-    words
 }
 
 /// Events of sixteen pixels, if `P` listens.

@@ -14,11 +14,12 @@ use crate::contract::tiled::{BlockList, Listener, TiledDesign};
 use crate::fast::{
     Count, FastEngine, FastTracked, Flaw, Parameterised, Published, PublishedHash, Width, levels,
 };
+use crate::in_lanes::words as words_of;
 use crate::stochastic::fast::abreast::hits::Limits;
+use crate::stochastic::fast::abreast::nested;
 use crate::stochastic::fast::abreast::packed::{
     Ranks, all, bit, left_by, pack, packed, right_by, unpack,
 };
-use crate::stochastic::fast::abreast::{met::words_of, nested};
 use crate::stochastic::fast::tests::{PARAMS, frame};
 use crate::stochastic::single_pass;
 use crate::tracked::{Hashed, REFERENCE, TrackedSampler};

@@ -4,8 +4,9 @@ use fearless_simd::prelude::*;
 use fearless_simd::{Simd, i32x16, mask32x16, u32x16};
 
 use crate::contract::event::Probe;
+use crate::in_lanes::words as words_of;
 use crate::stochastic::fast::abreast::hits::{Limits, scrambled};
-use crate::stochastic::fast::abreast::met::{Abreast, Counted, Met, Source, gather, words_of};
+use crate::stochastic::fast::abreast::met::{Abreast, Counted, Met, Source, gather};
 use crate::stochastic::fast::abreast::packed::{Ranks, STRIDE, bit, count, pack, right_by, unpack};
 use crate::stochastic::fast::references::FastReferences;
 use crate::stochastic::fast::tracked::{FastTracked, Rules, Switches, Track};
