@@ -77,15 +77,15 @@ struct Part<'a> {
 }
 
 /// Minutes on two processors that the parts take with the default effort, roughly: the tables
-/// (their share grows with the pixels and the seeds), the expectations (with theirs), the
+/// (their share grows with the pixels and the seeds), the expectations (with theirs), shadow maps, the
 /// comparison of all designs, this project's own over many seeds, splats, and what programs drew.
-const MINUTES: [f64; 6] = [15.0, 7.0, 25.0, 12.0, 3.0, 1.0];
+const MINUTES: [f64; 7] = [15.0, 7.0, 2.0, 25.0, 12.0, 3.0, 1.0];
 
 /// How long it takes on so many threads, roughly, in minutes.
 fn minutes(effort: Effort, part: Option<Publication>, threads: usize) -> f64 {
     let square = |side: u32, usual: f64| (f64::from(side) / usual).powi(2);
     let seeds = f64::from(effort.seeds) / 4.0;
-    let [tables, means, comparison, beyond, splats, programs] = MINUTES;
+    let [tables, means, shadows, comparison, beyond, splats, programs] = MINUTES;
     let of = |own: Publication| part.is_none_or(|only| only == own);
     let mut minutes = 0.0;
     if of(Publication::LaineKarras) {
@@ -93,6 +93,9 @@ fn minutes(effort: Effort, part: Option<Publication>, threads: usize) -> f64 {
     }
     if of(Publication::Methods) {
         minutes += means * f64::from(effort.seeds_of_means) / 128.0;
+    }
+    if of(Publication::Shadows) {
+        minutes += shadows * square(effort.comparison_side, 96.0) * seeds;
     }
     if of(Publication::Comparison) {
         minutes += comparison * square(effort.comparison_side, 128.0) * seeds;

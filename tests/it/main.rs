@@ -39,4 +39,5 @@ mod trace_file;
 mod unbiased;
 mod util;
 mod view;
+mod visibility;
 mod vulkan;

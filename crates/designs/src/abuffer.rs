@@ -9,7 +9,7 @@ use screendoor_rop::{
 };
 use screendoor_trace::error::Result;
 use screendoor_trace::param::{Typed, Values};
-use screendoor_trace::trace::Fragment;
+use screendoor_trace::trace::{Fragment, Unorm32};
 
 screendoor_trace::options! {
     /// What becomes of a fragment that finds the list full.
@@ -172,6 +172,15 @@ impl<const N: usize> Transparent<N> for ABufferAt<N> {
             }
             (colour, transmittance * f64::from(*passes))
         })
+    }
+
+    /// What was blended for want of room lies behind the list, as it does in the picture.
+    fn visibility(&self, pixel: &ABufferPixel, at: &[Unorm32; N]) -> Option<[f64; N]> {
+        Some(self.layering.columns.passing_nearer(&pixel.layers, at, |nearer, column| {
+            let listed = composite(nearer, column).1;
+            let blended = pixel.blended.get(column).filter(|_| nearer.len() == pixel.layers.len());
+            blended.map_or(listed, |(_, passes)| listed * f64::from(*passes))
+        }))
     }
 
     fn contents(&self, pixel: &ABufferPixel) -> Contents {

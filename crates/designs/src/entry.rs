@@ -9,8 +9,8 @@ use screendoor_rop::stochastic::draws_opaque_first;
 use screendoor_rop::view_depth::asks_for_view;
 use screendoor_rop::{
     Blueprint, ExplainLimits, Explanation, Frame, Implementation, Info, Layout, Port,
-    PrimitiveDepths, Promises, ReplayOptions, Replayed, Site, StateBits, TiledDesign, explain,
-    replay,
+    PrimitiveDepths, Promises, ReplayOptions, Replayed, Site, StateBits, TiledDesign,
+    VisibilityMap, explain, replay,
 };
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::param::Values;
@@ -177,6 +177,39 @@ impl Configured {
             events.multiplications = None;
         }
         Ok(replayed)
+    }
+
+    /// Draws `trace`, a light's, to be asked how much light reaches a depth.
+    ///
+    /// # Errors
+    /// [`Error::Config`] where the design's state does not tell that; as [`VisibilityMap::draw`] and [`Frame::of`].
+    pub fn visibility_map(
+        &self,
+        trace: &Trace,
+        samples: u32,
+        seed: u32,
+        options: &ReplayOptions<'_>,
+    ) -> Result<VisibilityMap> {
+        let frame = self.frame_within(trace, samples, seed, options.memory)?;
+        for implementation in [options.implementation, Implementation::Reference] {
+            let design = self.build(&frame, implementation)?;
+            if VisibilityMap::answers(&*design, &frame) {
+                return VisibilityMap::draw(design, &frame, trace, options);
+            }
+        }
+        let tells = |entry: &&Entry| {
+            let plain =
+                entry.configure(&[]).and_then(|d| d.build(&frame, Implementation::Reference));
+            plain.is_ok_and(|design| VisibilityMap::answers(&*design, &frame))
+        };
+        let names: Vec<&str> = DESIGNS.iter().filter(tells).map(|e| e.info.name).collect();
+        Err(Error::config(
+            format_args!(
+                "what '{}' keeps does not tell how much light reaches a depth",
+                self.label()
+            ),
+            format_args!("these designs tell it: {}", names.join(", ")),
+        ))
     }
 
     /// The design as a GPU runs it.

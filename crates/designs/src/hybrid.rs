@@ -9,7 +9,7 @@ use screendoor_rop::{
 };
 use screendoor_trace::error::Result;
 use screendoor_trace::param::Values;
-use screendoor_trace::trace::Fragment;
+use screendoor_trace::trace::{Fragment, Unorm32};
 
 /// The design's entry in the registry.
 pub struct Hybrid;
@@ -139,6 +139,16 @@ impl<const N: usize> Transparent<N> for HybridAt<N> {
         })
     }
 
+    /// The tail has no depths: it lies right behind the core, whose last layer is nearer than all
+    /// of it.
+    fn visibility(&self, pixel: &HybridPixel, at: &[Unorm32; N]) -> Option<[f64; N]> {
+        let passes_tail = pixel.tail.over().1;
+        Some(self.0.columns.passing_nearer(&pixel.core, at, |nearer, column| {
+            let core = composite(nearer, column).1;
+            if nearer.len() == pixel.core.len() { core * passes_tail } else { core }
+        }))
+    }
+
     fn contents(&self, pixel: &HybridPixel) -> Contents {
         let Tail { colour, alpha, count } = pixel.tail;
         let colour = colour.map(|c| format!("{c:.3}")).join(" ");
@@ -151,7 +161,7 @@ impl<const N: usize> Transparent<N> for HybridAt<N> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use screendoor_trace::trace::{SampleMask, Unorm32};
+    use screendoor_trace::trace::SampleMask;
 
     #[test]
     fn a_tail_by_hand() {

@@ -440,6 +440,11 @@ impl<const N: usize> Transparent<N> for SlabAt<N> {
         pixel.sums.resolve(self.normalise, self.columns, behind, own)
     }
 
+    fn visibility(&self, pixel: &SlabPixel, at: &[Unorm32; N]) -> Option<[f64; N]> {
+        let passes = |nearer: &[SlabLayer], column: usize| self.through(nearer, column).1;
+        Some(self.columns.passing_nearer(&pixel.layers, at, passes))
+    }
+
     fn contents(&self, pixel: &SlabPixel) -> Contents {
         let mut contents = contents(pixel.layers.iter().map(|l| &l.layer));
         if self.opacity == Opacity::Discrete {

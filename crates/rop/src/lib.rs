@@ -12,6 +12,7 @@ mod replay;
 pub mod resolve;
 mod shaders;
 pub mod stochastic;
+pub mod visibility;
 
 pub use blended::{accumulators, view_depth};
 pub use contract::{colour, over_opaque};
@@ -62,3 +63,4 @@ pub use stochastic::reference_value::{Reference, ReferenceKey, prehash, scramble
 pub use stochastic::subset::{random_subset, visible_independent, visible_stratified};
 pub use stochastic::surface::{CoveredMask, SurfaceRule, SurfaceTracker, Tracked};
 pub use stochastic::{Round, Sampler, Stochastic};
+pub use visibility::VisibilityMap;

@@ -26,7 +26,7 @@ use screendoor_rop::{
 };
 use screendoor_trace::error::Result;
 use screendoor_trace::param::Values;
-use screendoor_trace::trace::Fragment;
+use screendoor_trace::trace::{Fragment, Unorm32};
 
 /// The design's entry in the registry.
 pub struct Adaptive;
@@ -185,6 +185,11 @@ impl<const N: usize> Transparent<N> for AdaptiveAt<N> {
         let count = self.columns.count() as f64;
         let behind = self.columns.over(behind, |column| composite(&pixel.nodes, column));
         std::array::from_fn(|i| f64::from(pixel.colour[i]) / count + behind[i])
+    }
+
+    fn visibility(&self, pixel: &AdaptivePixel, at: &[Unorm32; N]) -> Option<[f64; N]> {
+        let passes = |nearer: &[Layer], column: usize| composite(nearer, column).1;
+        Some(self.columns.passing_nearer(&pixel.nodes, at, passes))
     }
 
     fn contents(&self, pixel: &AdaptivePixel) -> Contents {

@@ -16,7 +16,7 @@ use screendoor_rop::{
 };
 use screendoor_trace::error::Result;
 use screendoor_trace::param::Values;
-use screendoor_trace::trace::{DepthPlane, Fragment, SampleMask};
+use screendoor_trace::trace::{DepthPlane, Fragment, SampleMask, Unorm32};
 
 /// The design's entry in the registry.
 pub struct Exact;
@@ -147,6 +147,18 @@ impl<const N: usize> Design for ExactAt<N> {
 
     fn contents(&self, layers: &Vec<Layer>) -> Contents {
         Contents { samples: Vec::new(), fields: vec![("fragments", layers.len().to_string())] }
+    }
+
+    /// `Π (1 − α_i)` over the fragments that lie nearer at the sample (Enderton et al. 2011,
+    /// section 3.2): the truth that other designs' are held against.
+    fn visibility(&self, layers: &Vec<Layer>, at: &[Unorm32], to: &mut [f64]) -> bool {
+        for ((s, offset), (at, to)) in
+            self.frame.positions.iter().enumerate().zip(at.iter().zip(to))
+        {
+            let nearer = |l: &&Layer| l.coverage.contains(s) && l.depth.at(*offset) < *at;
+            *to = layers.iter().filter(nearer).map(|l| 1.0 - f64::from(l.alpha)).product();
+        }
+        true
     }
 
     fn bytes_per_fragment(&self) -> Option<usize> {

@@ -17,7 +17,7 @@ use screendoor_rop::{
 };
 use screendoor_trace::error::Result;
 use screendoor_trace::param::{Typed, Values};
-use screendoor_trace::trace::Fragment;
+use screendoor_trace::trace::{Fragment, Unorm32};
 
 /// The design's entry in the registry.
 pub struct MomentBased;
@@ -225,6 +225,19 @@ impl<const N: usize> Transparent<N> for MomentBasedAt<N> {
 
     fn resolve(&self, _site: Site, pixel: &Self::Pixel, behind: &[[f32; 3]; N]) -> [f64; 3] {
         pixel.over(behind, MomentSums::layer)
+    }
+
+    /// As a fragment of the second pass would be weighed.
+    fn visibility(&self, pixel: &Self::Pixel, at: &[Unorm32; N]) -> Option<[f64; N]> {
+        let OfMoments { count, bias, overestimation } = self.rules.of_moments;
+        let sums = pixel.get();
+        let passes = |s: usize| {
+            // One sum a pixel, or one for each sample.
+            let Some(sums) = sums.get(s).or(sums.first()) else { return 1.0 };
+            let z = self.rules.depth.log_warped(at[s]);
+            sums.moments.transmittance(count, z, bias, overestimation)
+        };
+        Some(std::array::from_fn(passes))
     }
 
     fn contents(&self, pixel: &Self::Pixel) -> Contents {

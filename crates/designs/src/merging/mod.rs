@@ -329,6 +329,16 @@ impl<const N: usize> Transparent<N> for MergingAt<N> {
         self.rules.resolve(list.iter().map(|l| &l.sheet), behind)
     }
 
+    fn visibility(&self, list: &Vec<Listed>, at: &[Unorm32; N]) -> Option<[f64; N]> {
+        let passes = |s: usize| {
+            let position = self.rules.middles.position(s);
+            let hides =
+                |l: &&Listed| l.sheet.coverage.contains(s) && l.sheet.plane.at(position) < at[s];
+            list.iter().filter(hides).map(|l| 1.0 - f64::from(l.sheet.alpha)).product()
+        };
+        Some(std::array::from_fn(passes))
+    }
+
     fn contents(&self, list: &Vec<Listed>) -> Contents {
         let text = |l: &Sheet| {
             let colour = l.colour.map(|c| format!("{c:.3}")).join(" ");

@@ -15,6 +15,7 @@ mod noise;
 mod pixel_orders;
 mod programs;
 mod ratios;
+mod shadows;
 mod slab;
 mod splats;
 mod summary;
@@ -31,6 +32,7 @@ use crate::stability;
 use screendoor_study::metrics::Estimate;
 use screendoor_study::study::file::Publication;
 use screendoor_study::study::publications::methods::Methods;
+use screendoor_study::study::publications::shadows::Shadows;
 use screendoor_study::study::publications::{Publications, Reproduced};
 use screendoor_trace::error::Result;
 use screendoor_trace::output::OutputFile;
@@ -45,7 +47,7 @@ pub struct Chapter {
     /// What is told in short beside what is set against publications.
     in_short: Vec<Text>,
     /// What the sections show: file names without their endings.
-    pub figures: Vec<(&'static str, Drawn)>,
+    pub figures: Vec<(String, Drawn)>,
 }
 
 impl Chapter {
@@ -94,7 +96,7 @@ impl Drawn {
 
 /// The chapter of what was measured.
 pub fn chapter(measured: &Reproduced) -> Chapter {
-    let (mut in_short, mut figures) = (Vec::new(), Vec::new());
+    let (mut in_short, mut figures, mut views) = (Vec::new(), Vec::new(), Vec::new());
     let sections = match measured {
         Reproduced::LaineKarras(p) => {
             figures = figures::figures(p);
@@ -126,8 +128,16 @@ pub fn chapter(measured: &Reproduced) -> Chapter {
             in_short = programs::in_short(results);
             vec![programs::section(results)]
         }
+        Reproduced::Shadows(s) => {
+            in_short = shadows::in_short(s);
+            figures = shadows::figures(s);
+            views = shadows::view_charts(s);
+            SHADOWS.iter().filter_map(|section| section(s)).collect()
+        }
         Reproduced::Stability(s) => stability::sections(s),
     };
+    let figures = figures.into_iter().map(|(name, drawn)| (name.to_string(), drawn));
+    let figures = figures.chain(views).collect();
     Chapter { sections, in_short, figures }
 }
 
@@ -157,10 +167,13 @@ const METHODS: [Of<Methods>; 8] = [
     claims::hashing_section,
 ];
 
+const SHADOWS: [Of<Shadows>; 3] = [shadows::figure_3, shadows::figure_5, shadows::designs];
+
 /// The parts of RESULTS.md, each of which can be measured on its own.
-pub const PARTS: [Publication; 6] = [
+pub const PARTS: [Publication; 7] = [
     Publication::LaineKarras,
     Publication::Methods,
+    Publication::Shadows,
     Publication::Comparison,
     Publication::Beyond,
     Publication::Splats,

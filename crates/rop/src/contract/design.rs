@@ -4,7 +4,7 @@ use crate::contract::contents::Contents;
 use crate::contract::event::Probe;
 use crate::contract::frame::Site;
 use crate::contract::layout::Layout;
-use screendoor_trace::trace::Fragment;
+use screendoor_trace::trace::{Fragment, Unorm32};
 
 /// A design of a raster-operations unit, for pixels of a fixed number of samples.
 ///
@@ -18,7 +18,7 @@ use screendoor_trace::trace::Fragment;
 /// frame's samples.
 pub trait Design: Send + Sync {
     /// The state of one pixel: what this design needs and nothing else.
-    type Pixel: Send + 'static;
+    type Pixel: Send + Sync + 'static;
 
     /// How many times the design reads the trace.
     fn passes(&self) -> u32 {
@@ -58,6 +58,15 @@ pub trait Design: Send + Sync {
 
     /// The pixel's state as `explain` shows it.
     fn contents(&self, pixel: &Self::Pixel) -> Contents;
+
+    /// How much of the light that comes through the near plane reaches a depth: puts down the
+    /// share (0 to 1) for each sample, of whose depths `at` has one each; `svis(z)` of Enderton
+    /// et al. 2011, sections 3.2 and 3.4, is the mean over the samples. What lies at that very
+    /// depth does not hide it. Tells whether the pixel's state says: which does not depend on the
+    /// pixel; where not, `to` stays as it was.
+    fn visibility(&self, _pixel: &Self::Pixel, _at: &[Unorm32], _to: &mut [f64]) -> bool {
+        false
+    }
 
     /// Bytes that the state grows by with each fragment, where it grows; the
     /// replay then works in groups of tiles that fit into its memory limit.

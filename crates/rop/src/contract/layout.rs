@@ -89,6 +89,18 @@ impl Layout {
         self
     }
 
+    /// The same without the fields that hold colours: what is left where depths alone are asked
+    /// for, as of a shadow map.
+    pub fn without_colours(&self) -> Layout {
+        let mut layout = Layout::default();
+        for group in &self.groups {
+            let kept = group.fields.iter().filter(|field| !field.what.ends_with("colour"));
+            let kept: Vec<(u32, &'static str)> = kept.map(|f| (f.bits, f.what)).collect();
+            layout = layout.with(group.count, group.samples, &kept);
+        }
+        layout
+    }
+
     /// What it is made of.
     pub fn groups(&self) -> &[Group] {
         &self.groups
@@ -138,6 +150,8 @@ mod tests {
         let layout =
             Layout::samples(8, &[(32, "depth"), (48, "colour")]).and(1, &[(40, "tracking")]);
         assert_eq!(layout.to_string(), "8 × (32 depth + 48 colour) + 40 tracking");
+        let of_depths = layout.clone().and(1, &[(48, "summed colour")]).without_colours();
+        assert_eq!(of_depths.to_string(), "8 × 32 depth + 40 tracking");
         assert_eq!(layout.bits(), StateBits { samples: 640, extra: 40, unbounded: false });
         // Nothing is said of what is not there.
         let layout = Layout::of(4, &[(16, "alpha"), (0, "mask")]).and(0, &[(9, "x")]);

@@ -59,7 +59,7 @@ fn needed(opaque: Opaque, frame: &Frame) -> Opaque {
 /// The methods are those of [`Design`] but for what is said here.
 pub trait Transparent<const N: usize>: Send + Sync {
     /// The state of one pixel beside the opaque z-buffer.
-    type Pixel: Send + 'static;
+    type Pixel: Send + Sync + 'static;
 
     /// How many times it reads the trace.
     fn passes(&self) -> u32 {
@@ -102,6 +102,12 @@ pub trait Transparent<const N: usize>: Send + Sync {
 
     /// As [`Design::contents`].
     fn contents(&self, pixel: &Self::Pixel) -> Contents;
+
+    /// As [`Design::visibility`], through what this design draws alone; `None` where its state
+    /// does not say.
+    fn visibility(&self, _pixel: &Self::Pixel, _at: &[Unorm32; N]) -> Option<[f64; N]> {
+        None
+    }
 
     /// As [`Design::bytes_per_fragment`].
     fn bytes_per_fragment(&self) -> Option<usize> {
@@ -217,6 +223,25 @@ impl<T: Transparent<N>, const N: usize> OverOpaque<T, N> {
         None
     }
 
+    /// [`Design::visibility`], of the two parts of a pixel: opaque geometry hides what lies behind
+    /// it, sample by sample.
+    pub(crate) fn visibility_of(
+        &self,
+        (opaque, inner): (&Option<Box<Samples<N>>>, &T::Pixel),
+        at: &[Unorm32],
+        to: &mut [f64],
+    ) -> bool {
+        let at: &[Unorm32; N] = at.try_into().expect("a depth for each sample");
+        let Some(passes) = self.inner.visibility(inner, at) else { return false };
+        to.copy_from_slice(&passes);
+        if let Some(samples) = opaque {
+            for s in (0..N).filter(|s| samples.depth[*s] < at[*s]) {
+                to[s] = 0.0;
+            }
+        }
+        true
+    }
+
     /// [`Design::contents`], of the two parts of a pixel.
     pub(crate) fn contents_of(
         &self,
@@ -283,6 +308,10 @@ impl<T: Transparent<N>, const N: usize> Design for OverOpaque<T, N> {
 
     fn contents(&self, pixel: &Self::Pixel) -> Contents {
         self.contents_of((&pixel.opaque, &pixel.inner))
+    }
+
+    fn visibility(&self, pixel: &Self::Pixel, at: &[Unorm32], to: &mut [f64]) -> bool {
+        self.visibility_of((&pixel.opaque, &pixel.inner), at, to)
     }
 
     fn bytes_per_fragment(&self) -> Option<usize> {

@@ -10,10 +10,10 @@ use crate::contract::frame::Site;
 use crate::contract::layout::{Layout, StateBits};
 use screendoor_trace::picture::TilePixels;
 use screendoor_trace::tile::{TILE_PIXELS, TileGrid, TileId};
-use screendoor_trace::trace::Block;
+use screendoor_trace::trace::{Block, Unorm32};
 
 /// The pixels of a tile as their design holds them.
-pub type TileState = Box<dyn Any + Send>;
+pub type TileState = Box<dyn Any + Send + Sync>;
 
 /// A design, tile by tile: a few dynamic calls for many fragments, none for each.
 pub trait TiledDesign: Send + Sync {
@@ -69,6 +69,17 @@ pub trait TiledDesign: Send + Sync {
     fn resolve(&self, grid: TileGrid, tile: TileId, state: &TileState) -> TilePixels;
     /// What a tile's pixel holds; `within` is its place in the tile.
     fn contents(&self, state: &TileState, within: usize) -> Contents;
+    /// As [`Design::visibility`], of a tile's pixel. An engine that cannot tell quickly says no, as
+    /// here, and the plain text is asked.
+    fn visibility(
+        &self,
+        _state: &TileState,
+        _within: usize,
+        _at: &[Unorm32],
+        _to: &mut [f64],
+    ) -> bool {
+        false
+    }
 }
 
 /// A tile's fragments, a block at a time.
@@ -171,6 +182,11 @@ impl<D: Design> TiledDesign for D {
     fn contents(&self, state: &TileState, within: usize) -> Contents {
         let pixels = state.downcast_ref::<Vec<D::Pixel>>().expect("the state is the design's own");
         Design::contents(self, &pixels[within])
+    }
+
+    fn visibility(&self, state: &TileState, within: usize, at: &[Unorm32], to: &mut [f64]) -> bool {
+        let pixels = state.downcast_ref::<Vec<D::Pixel>>().expect("the state is the design's own");
+        Design::visibility(self, &pixels[within], at, to)
     }
 }
 

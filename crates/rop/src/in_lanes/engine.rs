@@ -19,7 +19,7 @@ use crate::in_lanes::window::{MOST_ROWS, Window};
 use crate::in_lanes::{HasLanes, MOST_SAMPLES};
 use screendoor_trace::picture::TilePixels;
 use screendoor_trace::tile::{TILE_PIXELS, TILE_SIDE, TileGrid, TileId};
-use screendoor_trace::trace::{BLOCK, Block, Fragment};
+use screendoor_trace::trace::{BLOCK, Block, Fragment, Unorm32};
 
 /// The design `plain` with the instructions of `level`, sixteen pixels at a time where a tile has
 /// fragments enough; `None` where it has no lanes.
@@ -290,5 +290,10 @@ impl<T: HasLanes<N> + 'static, const N: usize> TiledDesign for Engine<T, N> {
     fn contents(&self, state: &TileState, within: usize) -> Contents {
         let tile = seen::<T::Pixel, N>(state);
         self.plain.contents_of((&tile.opaque[within], &tile.inner[within]))
+    }
+
+    fn visibility(&self, state: &TileState, within: usize, at: &[Unorm32], to: &mut [f64]) -> bool {
+        let tile = seen::<T::Pixel, N>(state);
+        self.plain.visibility_of((&tile.opaque[within], &tile.inner[within]), at, to)
     }
 }

@@ -6,7 +6,7 @@ use std::marker::PhantomData;
 
 use fearless_simd::{Simd, mask32x16};
 use screendoor_trace::param::Values;
-use screendoor_trace::trace::Fragment;
+use screendoor_trace::trace::{Fragment, Unorm32};
 
 use crate::contract::contents::Contents;
 use crate::contract::event::Probe;
@@ -16,7 +16,7 @@ use crate::contract::over_opaque::{self, OverOpaque, Transparent};
 use crate::contract::words::{Declaration, OnDevice, PixelWords};
 use crate::in_lanes::Told;
 use crate::layered::in_lanes::{BoundedInLanes, EvictedLanes};
-use crate::layered::layers::{Columns, Layer, Layering, contents};
+use crate::layered::layers::{Columns, Layer, Layering, composite, contents};
 
 /// What becomes of the furthest of one layer too many.
 pub trait Eviction: Clone + Copy + Debug + Send + Sync + 'static {
@@ -91,6 +91,11 @@ impl<E: Eviction, const N: usize> Transparent<N> for Bounded<E, N> {
 
     fn contents(&self, layers: &Vec<Layer>) -> Contents {
         contents(layers)
+    }
+
+    fn visibility(&self, layers: &Vec<Layer>, at: &[Unorm32; N]) -> Option<[f64; N]> {
+        let passes = |nearer: &[Layer], column: usize| composite(nearer, column).1;
+        Some(self.layering.columns.passing_nearer(layers, at, passes))
     }
 }
 

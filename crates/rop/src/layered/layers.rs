@@ -108,6 +108,22 @@ impl<const N: usize> Columns<N> {
         }
     }
 
+    /// How much passes at each sample those of the layers, near to far, that lie before the
+    /// depth `at` there, by what `passes` them in a column. A layer lies at one depth in all of a
+    /// pixel.
+    pub fn passing_nearer<T: Deep>(
+        self,
+        layers: &[T],
+        at: &[Unorm32; N],
+        passes: impl Fn(&[T], usize) -> f64,
+    ) -> [f64; N] {
+        std::array::from_fn(|s| {
+            let nearer = layers.partition_point(|l| l.depth() < at[s]);
+            let column = if self.coverage == Coverage::Mask { s } else { 0 };
+            passes(&layers[..nearer], column)
+        })
+    }
+
     /// What a whole layer holds.
     fn fields(self) -> [(u32, &'static str); 4] {
         [

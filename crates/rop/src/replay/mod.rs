@@ -25,7 +25,7 @@ pub use options::{Implementation, ReplayOptions};
 use crate::contract::event::EventCounts;
 use crate::contract::frame::Frame;
 use crate::contract::layout::{Layout, StateBits};
-use crate::contract::tiled::TiledDesign;
+use crate::contract::tiled::{TileState, TiledDesign};
 use screendoor_trace::error::Result;
 use screendoor_trace::picture::{Picture, TilePixels};
 use screendoor_trace::tile::TileMap;
@@ -60,6 +60,24 @@ struct Job<'a> {
 struct Drawn {
     tiles: TileMap<TilePixels>,
     events: Option<EventCounts>,
+}
+
+/// The states of all tiles that a fragment touches when the whole of `trace` is drawn.
+///
+/// # Errors
+/// As [`replay()`]; [`screendoor_trace::error::Error::Config`] where states that grow with the fragments do not
+/// fit into the memory limit.
+pub(crate) fn states(
+    design: &dyn TiledDesign,
+    frame: &Frame,
+    trace: &Trace,
+    options: &ReplayOptions<'_>,
+) -> Result<TileMap<TileState>> {
+    let job = Job { design, frame, trace, options };
+    match whole::bins(&job)? {
+        Some(bins) if whole::keeps_all(&job, &bins) => Ok(whole::states(&job, &bins)),
+        _ => windows::states(&job),
+    }
 }
 
 /// Replays `trace` through `design`.

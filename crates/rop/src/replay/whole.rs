@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use rayon::prelude::*;
 
 use crate::contract::event::EventCounts;
-use crate::contract::tiled::Listener;
+use crate::contract::tiled::{Listener, TileState};
 use crate::replay::blocks::TileBlocks;
 use crate::replay::{Drawn, Job};
 use screendoor_trace::error::Result;
@@ -87,6 +87,45 @@ pub(super) fn draw(job: &Job<'_>, bins: &Bins) -> Drawn {
     }
     told.all();
     drawn
+}
+
+/// Whether the states of all tiles fit beside the fragments, of a design whose state grows with
+/// them.
+pub(super) fn keeps_all(job: &Job<'_>, bins: &Bins) -> bool {
+    together(job, bins, bins.tiles()) == bins.tiles().len()
+}
+
+/// The states of all tiles that a fragment touches, after the last pass.
+pub(super) fn states(job: &Job<'_>, bins: &Bins) -> TileMap<TileState> {
+    let told = Told::new(job);
+    let draw = |block: &mut Block, (tile, rows): &(TileId, u64)| {
+        let state = drawn_state(job, bins, *tile, block);
+        told.more(*rows);
+        Some((*tile, state?))
+    };
+    let drawn = bins.tiles().par_iter().map_init(Block::default, draw);
+    let mut states = TileMap::new(job.frame.grid);
+    for (tile, state) in drawn.collect::<Vec<_>>().into_iter().flatten() {
+        states.touch(tile, || state);
+    }
+    told.all();
+    states
+}
+
+/// A tile's state after the last pass, where a fragment touches it.
+fn drawn_state(job: &Job<'_>, bins: &Bins, tile: TileId, block: &mut Block) -> Option<TileState> {
+    let Job { design, frame, .. } = job;
+    let mut state = None;
+    for pass in 0..design.passes() {
+        let mut blocks = TileBlocks::of(bins, tile, frame, block);
+        if !blocks.any() {
+            return None;
+        }
+        let state = state.get_or_insert_with(|| design.clear(frame.grid, tile));
+        design.draw_blocks(pass, state, &mut blocks, Listener::Nobody);
+        design.end_pass(pass, frame.grid, tile, state, Listener::Nobody);
+    }
+    state
 }
 
 /// How many of the tiles may be drawn at the same time: their states must fit into memory.

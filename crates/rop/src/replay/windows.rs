@@ -8,7 +8,7 @@ use crate::contract::tiled::{Listener, TileState};
 use crate::replay::blocks::TileBlocks;
 use crate::replay::group::group_tiles;
 use crate::replay::{Drawn, Job};
-use screendoor_trace::error::Result;
+use screendoor_trace::error::{Error, Result};
 use screendoor_trace::picture::TilePixels;
 use screendoor_trace::tile::{TileId, TileMap};
 use screendoor_trace::trace::{Bins, Block, RowPlace, Tiles};
@@ -38,20 +38,8 @@ pub(super) fn draw(job: &Job<'_>) -> Result<Drawn> {
     let rows = options.window as u64;
     let mut bins = Bins::new(trace, rows, memory);
     for group in &groups {
-        let mut states: TileMap<Option<TileState>> = TileMap::new(frame.grid);
-        for pass in 0..design.passes() {
-            let mut next = RowPlace::default();
-            while !next.is_end(trace) {
-                let (end, through) = bins.fill(trace, next, rows, group)?;
-                let events = draw_window(job, &bins, pass, &mut states);
-                drawn.events = drawn.events.map(|all| all.merged(&events));
-                next = end;
-                done += through;
-                (options.progress)(done, total);
-            }
-            let events = end_pass(job, pass, &mut states);
-            drawn.events = drawn.events.map(|all| all.merged(&events));
-        }
+        let (states, events) = draw_group(job, &mut bins, group, (&mut done, total))?;
+        drawn.events = drawn.events.map(|all| all.merged(&events));
         let resolved = states.filter_map(|tiles| {
             // A tile without a state was met by nothing that covers a sample.
             let resolve = |(tile, state): (TileId, Option<TileState>)| {
@@ -62,6 +50,63 @@ pub(super) fn draw(job: &Job<'_>) -> Result<Drawn> {
         merge(&mut drawn.tiles, resolved, group);
     }
     Ok(drawn)
+}
+
+/// The states of all tiles that a fragment touches, after the last pass.
+///
+/// # Errors
+/// As [`crate::replay()`]; [`Error::Config`] where states that grow with the fragments do not fit
+/// into memory.
+pub(super) fn states(job: &Job<'_>) -> Result<TileMap<TileState>> {
+    let Job { design, frame, trace, options } = job;
+    if let Some(bytes) = design.bytes_per_fragment() {
+        let all = trace.rows().saturating_mul(bytes as u64);
+        if all > options.memory {
+            return Err(Error::config(
+                format_args!(
+                    "what the design keeps of all {} fragments takes {} MiB",
+                    trace.rows(),
+                    all.div_ceil(1 << 20)
+                ),
+                "raise the memory limit (--memory), or take a design whose state is bounded",
+            ));
+        }
+    }
+    let mut bins = Bins::new(trace, options.window as u64, options.memory);
+    let total = trace.rows() * u64::from(design.passes());
+    let (states, _) = draw_group(job, &mut bins, &Tiles::All, (&mut 0, total))?;
+    let mut touched = TileMap::new(frame.grid);
+    for (tile, state) in states.into_touched() {
+        if let Some(state) = state {
+            touched.touch(tile, || state);
+        }
+    }
+    Ok(touched)
+}
+
+/// Draws a group's tiles in windows: their states, and what was counted where that is asked for.
+/// `done` rows of `total` came before.
+fn draw_group(
+    job: &Job<'_>,
+    bins: &mut Bins,
+    group: &Tiles,
+    (done, total): (&mut u64, u64),
+) -> Result<(TileMap<Option<TileState>>, EventCounts)> {
+    let Job { design, frame, trace, options } = job;
+    let mut states: TileMap<Option<TileState>> = TileMap::new(frame.grid);
+    let mut events = EventCounts::default();
+    for pass in 0..design.passes() {
+        let mut next = RowPlace::default();
+        while !next.is_end(trace) {
+            let (end, through) = bins.fill(trace, next, options.window as u64, group)?;
+            events = events.merged(&draw_window(job, bins, pass, &mut states));
+            next = end;
+            *done += through;
+            (options.progress)(*done, total);
+        }
+        events = events.merged(&end_pass(job, pass, &mut states));
+    }
+    Ok((states, events))
 }
 
 /// Draws a window's fragments into the tiles' states, tiles in parallel; counts events where

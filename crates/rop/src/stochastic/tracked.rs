@@ -20,7 +20,7 @@ use screendoor_trace::trace::{Fragment, SampleMask};
 /// Where a surface's reference values come from.
 pub trait References: Send + Sync {
     /// What is kept of the current surface; the default before its first sample.
-    type Kept: Clone + Default + Send + 'static;
+    type Kept: Clone + Default + Send + Sync + 'static;
 
     /// The reference value of the surface's `n`-th sample, and how many hashes it
     /// took. Values are asked for in the order of the samples.

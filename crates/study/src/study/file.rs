@@ -39,6 +39,7 @@ screendoor_trace::options! {
         Beyond = "beyond": "no publication's: residual and merging beside LK, error and bias over many seeds",
         Splats = "splats": "no publication's: samplers and layers on files of Gaussian splats",
         Programs = "programs": "no publication's: fragments that four programs drew, under each design",
+        Shadows = "shadows": "Enderton's shadow maps: figures 3 and 5, and visibility by every design that tells it",
         Stability = "stability": "no publication's: hard cases with known truth, and correlations",
     }
 }

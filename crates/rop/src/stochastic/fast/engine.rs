@@ -17,7 +17,7 @@ use crate::stochastic::fast::{abreast, kernel};
 use crate::stochastic::methods::{Pass, Round};
 use screendoor_trace::picture::TilePixels;
 use screendoor_trace::tile::{TILE_PIXELS, TileGrid, TileId};
-use screendoor_trace::trace::{BLOCK, Block, Fragment};
+use screendoor_trace::trace::{BLOCK, Block, Fragment, Unorm32};
 
 impl<F: FastSampler<N>, const N: usize> FastEngine<F, N>
 where
@@ -383,5 +383,10 @@ where
     fn contents(&self, state: &TileState, within: usize) -> Contents {
         let state: &FastTile<F, N> = state.downcast_ref().expect("the state is the engine's own");
         Design::contents(&self.plain, &state.plain(&self.sampler, within))
+    }
+
+    fn visibility(&self, state: &TileState, within: usize, at: &[Unorm32], to: &mut [f64]) -> bool {
+        let state: &FastTile<F, N> = state.downcast_ref().expect("the state is the engine's own");
+        Design::visibility(&self.plain, &state.plain(&self.sampler, within), at, to)
     }
 }

@@ -66,7 +66,7 @@ pub trait FastReferences<const N: usize>: Copy + Send + Sync + 'static {
     /// The plain text.
     type Plain: References;
     /// What is kept of the current surface; the default before its first sample.
-    type Kept: Copy + Default + Send + 'static;
+    type Kept: Copy + Default + Send + Sync + 'static;
 
     /// What is kept, as the plain text has it.
     fn to_plain(kept: Self::Kept) -> <Self::Plain as References>::Kept;

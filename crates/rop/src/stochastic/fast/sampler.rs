@@ -84,7 +84,7 @@ pub trait FastSampler<const N: usize>: Send + Sync + 'static {
     /// The plain text.
     type Plain: Sampler<N>;
     /// What it keeps of a pixel beside the multisample buffer.
-    type State: Copy + Send + 'static;
+    type State: Copy + Send + Sync + 'static;
     /// The same with pixels in lanes.
     type Abreast: Abreast<N, Kept = Self::State>;
 

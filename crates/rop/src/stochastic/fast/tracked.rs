@@ -36,7 +36,7 @@ pub struct Switches {
 /// Where the switches come from: known when the kernel is compiled, or not.
 pub trait Rules: Copy + Send + Sync + 'static {
     /// What a pixel keeps beside the published state.
-    type More: Copy + Default + Send + 'static;
+    type More: Copy + Default + Send + Sync + 'static;
     /// Whether that is anything.
     const HAS_MORE: bool;
 

@@ -269,6 +269,27 @@ impl<S: Sampler<N>, const N: usize> Transparent<N> for Methods<S, N> {
         std::array::from_fn(|i| factor * f64::from(sums.colour[i]) + behind_it[i])
     }
 
+    /// `svis` counts the samples whose stored depth does not lie before; with the correction, the
+    /// light that they take away is scaled to what all fragments take away, `1 − (1 − svis(z)) ·
+    /// (1 − vis(∞)) / (1 − svis(∞))` over the pixel (section 3.6). Of several rounds the last alone
+    /// would be there: they do not tell.
+    fn visibility(&self, pixel: &Self::Pixel, at: &[Unorm32; N]) -> Option<[f64; N]> {
+        if self.rounds > 1 {
+            return None;
+        }
+        // What is compared has as few bits as what is stored.
+        let lit: [bool; N] =
+            std::array::from_fn(|s| at[s].narrowed(self.depth_bits) <= pixel.samples.depth[s]);
+        let Some(sums) = pixel.sums.as_ref().filter(|_| self.method.corrected()) else {
+            return Some(lit.map(|lit| if lit { 1.0 } else { 0.0 }));
+        };
+        let hidden = lit.iter().filter(|lit| !**lit).count() as f64;
+        let occupied = f64::from(sums.occupied.count());
+        let through = sums.transmittance.iter().map(|t| f64::from(*t)).sum::<f64>() / N as f64;
+        let taken = if hidden > 0.0 { hidden / occupied * (1.0 - through) } else { 0.0 };
+        Some([1.0 - taken; N])
+    }
+
     fn contents(&self, pixel: &Self::Pixel) -> Contents {
         let mut contents = Contents {
             samples: pixel.samples.contents(),

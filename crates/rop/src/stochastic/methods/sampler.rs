@@ -20,7 +20,7 @@ pub struct Round {
 /// How a design chooses the samples that a fragment writes.
 pub trait Sampler<const N: usize>: Send + Sync {
     /// What it keeps of a pixel beside the multisample buffer.
-    type State: Send + 'static;
+    type State: Send + Sync + 'static;
 
     /// A pixel's state before the first fragment of a round.
     fn clear(&self, site: Site) -> Self::State;

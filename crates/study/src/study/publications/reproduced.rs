@@ -6,6 +6,7 @@ use crate::study::publications::beyond::{Beyond, beyond};
 use crate::study::publications::experiment::Lab;
 use crate::study::publications::methods::{Methods, methods};
 use crate::study::publications::programs::programs;
+use crate::study::publications::shadows::{Shadows, shadows};
 use crate::study::publications::splats::splats;
 use crate::study::publications::{Effort, Publications, reproduce};
 use crate::study::results::Results;
@@ -29,6 +30,8 @@ pub enum Reproduced {
     Splats(Box<Beyond>),
     /// [`Publication::Programs`].
     Programs(Box<Results>),
+    /// [`Publication::Shadows`].
+    Shadows(Box<Shadows>),
     /// [`Publication::Stability`].
     Stability(Box<Stability>),
 }
@@ -44,6 +47,7 @@ impl Reproduced {
             Reproduced::Beyond(_) => Publication::Beyond,
             Reproduced::Splats(_) => Publication::Splats,
             Reproduced::Programs(_) => Publication::Programs,
+            Reproduced::Shadows(_) => Publication::Shadows,
             Reproduced::Stability(_) => Publication::Stability,
         }
     }
@@ -52,7 +56,10 @@ impl Reproduced {
     pub fn missing(&self) -> &[String] {
         match self {
             Reproduced::LaineKarras(p) => &p.missing,
-            Reproduced::Methods(_) | Reproduced::Programs(_) | Reproduced::Stability(_) => &[],
+            Reproduced::Methods(_)
+            | Reproduced::Programs(_)
+            | Reproduced::Shadows(_)
+            | Reproduced::Stability(_) => &[],
             Reproduced::Slab(c) | Reproduced::Comparison(c) => &c.missing,
             Reproduced::Beyond(b) | Reproduced::Splats(b) => &b.missing,
         }
@@ -76,6 +83,7 @@ pub fn measure_publication(
         Publication::Beyond => Reproduced::Beyond(Box::new(beyond(lab, effort)?)),
         Publication::Splats => Reproduced::Splats(Box::new(splats(lab, effort)?)),
         Publication::Programs => Reproduced::Programs(Box::new(programs(lab)?)),
+        Publication::Shadows => Reproduced::Shadows(Box::new(shadows(lab, effort)?)),
         Publication::Stability => {
             Reproduced::Stability(Box::new(stress_designs(16, |what, done, total| {
                 (lab.watch)(what, done, total);
