@@ -243,12 +243,19 @@ impl RunArguments {
 
     /// The design, the open trace, and the sample count, each checked.
     pub fn open(&self, console: &Console) -> Result<(Configured, Trace, u32)> {
-        let design = self.design.configure()?;
+        // Before the trace is opened, which may take a while.
+        self.design.configure()?;
         let trace = open_trace(&self.trace, console)?;
+        let (design, samples) = self.of(&trace)?;
+        Ok((design, trace, samples))
+    }
+
+    /// The design and the sample count on an open trace, each checked.
+    pub fn of(&self, trace: &Trace) -> Result<(Configured, u32)> {
         let pattern = &trace.header().pattern;
         let samples = self.samples.unwrap_or(pattern.samples());
         pattern.prefix(samples)?;
-        Ok((design, trace, samples))
+        Ok((self.design.configure()?, samples))
     }
 }
 

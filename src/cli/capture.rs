@@ -7,8 +7,8 @@ use clap::{Arg, Args};
 use serde::Serialize;
 
 use crate::capture::{
-    CameraChoice, CameraOptions, Capture, CaptureOptions, Faces, Order, PatternKind, SplatRules,
-    Unseen,
+    CameraChoice, CameraOptions, Capture, CaptureOptions, Faces, Light, Order, PatternKind,
+    SplatRules, Unseen,
 };
 use crate::cli::arguments::{self, Change, Each, colour, numbers, option, samples, size};
 use crate::cli::console::{Console, grouped, table};
@@ -174,6 +174,16 @@ struct SceneArguments {
     /// beside surfaces are left out, and others are as wide as suits their extent
     #[arg(long, value_name = "WIDTH", allow_negative_numbers = true)]
     line_width: Option<f64>,
+    /// Record of each fragment what of its colour comes from a light, which 'screendoor shade' gives
+    /// shadows: NAME[:parameter=value,…] ('screendoor scenes' lists them)
+    #[arg(long, value_name = "LIGHT")]
+    light: Option<String>,
+    /// With --light, the trace of the light's own view, drawn by our own rasteriser
+    #[arg(long, value_name = "TRACE", requires = "light")]
+    light_trace: Option<PathBuf>,
+    /// Its size in pixels: 512x512 where not given
+    #[arg(long, value_name = "WxH", value_parser = size, requires = "light_trace")]
+    light_size: Option<(u32, u32)>,
     /// Have a GPU find which samples are covered, at its own 4 samples a pixel
     #[arg(long, group = "held_against")]
     gpu: bool,
@@ -196,7 +206,25 @@ struct Document<'a> {
     unseen: &'a [Unseen],
     /// With `--check`: where the GPU's rasteriser and ours differ.
     check: Option<CrossCheck>,
+    /// With `--light-trace`: the light's.
+    light: Option<OfLight>,
 }
+
+/// The trace of a light's view.
+#[derive(Serialize)]
+struct OfLight {
+    trace: String,
+    width: u32,
+    height: u32,
+    fragments: u64,
+    bytes: u64,
+    content: String,
+    #[serde(skip)]
+    written: Written,
+}
+
+/// Pixels of a light's view of which nothing says the size.
+const LIGHT_SIZE: (u32, u32) = (512, 512);
 
 /// Pixels of a frame of which nothing says the size.
 const DEFAULT_SIZE: [u32; 2] = [800, 800];
@@ -230,14 +258,18 @@ fn run_scene(
         let what = "--camera-name is for a file of cameras";
         return Err(Error::config(what, "name the scene's own camera by --camera alone"));
     }
+    let light = arguments.light.as_deref().map(Light::parse).transpose()?;
     let of_file = choice.file().map(|_| choice.choose(&[])).transpose()?;
     let gpu = arguments.gpu.then(|| Gpu::open(arguments.adapter.as_deref())).transpose()?;
     let inputs: Vec<&Path> =
         path.into_iter().chain(arguments.texture.as_deref()).chain(choice.file()).collect();
-    let outputs: Vec<&Path> = [output].into_iter().chain(common.json.path()).collect();
+    let light_trace = arguments.light_trace.as_deref();
+    let traces: Vec<&Path> = [output].into_iter().chain(light_trace).collect();
+    let outputs: Vec<&Path> = traces.iter().copied().chain(common.json.path()).collect();
     check(&inputs, &outputs)?;
-    check_output(output, Kind::Trace)?;
+    traces.iter().try_for_each(|path| check_output(path, Kind::Trace))?;
     let file = OutputFile::create(output)?;
+    let light_file = light_trace.map(OutputFile::create).transpose()?;
     let json = common.json.open()?;
     let loading = console.progress("loading the scene", "");
     let load = LoadOptions {
@@ -285,10 +317,11 @@ fn run_scene(
         },
         splats,
         space: common.space,
+        light,
     };
     scene.warnings.extend(options.unused(&scene));
     let write = WriteOptions { compression: common.compress, ..WriteOptions::default() };
-    let reporting = Reporting { scene: &scene, unseen: true, strict: common.strict };
+    let reporting = Reporting { scene: &scene, warns: true, unseen: true, strict: common.strict };
     let ((written, unseen), differences) = match &gpu {
         None => (reporting.record(&Capture::new(&scene, &options)?, write, file, console)?, None),
         Some(gpu) => {
@@ -298,6 +331,12 @@ fn run_scene(
             (recorded, found)
         }
     };
+    let of_light = light_file
+        .map(|file| {
+            let size = arguments.light_size.unwrap_or(LIGHT_SIZE);
+            record_light(&scene, &options, size, (write, file), console)
+        })
+        .transpose()?;
     let document = Document {
         trace: output.display().to_string(),
         scene: &scene.source,
@@ -309,6 +348,7 @@ fn run_scene(
         content: &written.content,
         unseen: &unseen,
         check: differences,
+        light: of_light,
     };
     report(json, "screendoor.capture", &document, console, || {
         if let Some(found) = differences {
@@ -316,7 +356,36 @@ fn run_scene(
             let header = ["our rasteriser against the GPU's", ""];
             console.print(format_args!("{}", table(&header, rows.into())))?;
         }
-        print_trace(&document.trace, &written, written.rows, console)
+        print_trace(&document.trace, &written, written.rows, console)?;
+        document.light.as_ref().map_or(Ok(()), |light| {
+            print_trace(&light.trace, &light.written, light.written.rows, console)
+        })
+    })
+}
+
+/// Captures `scene` as its light sees it.
+fn record_light(
+    scene: &Scene,
+    options: &CaptureOptions,
+    (width, height): (u32, u32),
+    (write, file): (WriteOptions, OutputFile),
+    console: &Console,
+) -> Result<OfLight> {
+    let trace = file.path().display().to_string();
+    let of_light = Capture::new(scene, options)?.of_light([width, height]);
+    let Some(of_light) = of_light else { unreachable!("a light's trace is asked for with one") };
+    // What there is to warn of in the scene has been said of its own trace.
+    let reporting = Reporting { scene, warns: false, unseen: false, strict: false };
+    let capture = Capture::new(scene, &of_light)?;
+    let (written, _) = reporting.record(&capture, write, file, console)?;
+    Ok(OfLight {
+        trace,
+        width,
+        height,
+        fragments: written.rows,
+        bytes: written.bytes,
+        content: written.content.clone(),
+        written,
     })
 }
 
@@ -328,7 +397,7 @@ pub(super) fn record(
     file: OutputFile,
     console: &Console,
 ) -> Result<Written> {
-    let reporting = Reporting { scene, unseen: false, strict: false };
+    let reporting = Reporting { scene, warns: true, unseen: false, strict: false };
     reporting
         .record(&Capture::new(scene, options)?, write, file, console)
         .map(|(written, _)| written)
@@ -376,6 +445,8 @@ const MOST_UNSEEN: usize = 20;
 /// What is told of a capture.
 struct Reporting<'a> {
     scene: &'a Scene,
+    /// Whether the scene's warnings are.
+    warns: bool,
     /// Whether objects without fragments are.
     unseen: bool,
     /// Whether it is an error where anything is.
@@ -395,7 +466,9 @@ impl Reporting<'_> {
         console: &Console,
     ) -> Result<Recorded> {
         let header = capture.header();
-        console.warn_all(&self.scene.warnings, self.strict, &self.scene.source)?;
+        if self.warns {
+            console.warn_all(&self.scene.warnings, self.strict, &self.scene.source)?;
+        }
         let place = file.path().display().to_string();
         let mut writer = TraceWriter::new(file, &place, header.clone(), options)?;
         let progress = console.progress("capturing", "primitives");

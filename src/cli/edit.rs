@@ -16,7 +16,7 @@ use crate::edit::{
 };
 use crate::error::{Error, Result};
 use crate::output::OutputFile;
-use crate::trace::{ColourFormat, Compression, Trace, TraceWriter, WriteOptions};
+use crate::trace::{ColourFormat, Compression, Trace, TraceWriter, WriteOptions, Written};
 
 /// Write a trace anew: with checksums, packed, colours in another precision
 #[derive(Debug, Args)]
@@ -103,7 +103,7 @@ pub(super) struct ShuffleArguments {
 
 /// Where the new trace goes.
 #[derive(Debug, Args)]
-struct Target {
+pub(super) struct Target {
     /// The trace to write
     #[arg(long, short, value_name = "TRACE")]
     output: PathBuf,
@@ -115,7 +115,7 @@ struct Target {
 }
 
 #[derive(Serialize)]
-struct Document<'a> {
+pub(super) struct Document<'a> {
     trace: String,
     from: Vec<&'a str>,
     width: u32,
@@ -127,7 +127,16 @@ struct Document<'a> {
     /// Fragments whose colours lost something.
     rounded: u64,
     bytes: u64,
-    content: &'a str,
+    content: String,
+    #[serde(skip)]
+    written: Written,
+}
+
+impl Document<'_> {
+    /// Says in a line what was written.
+    pub fn print(&self, console: &Console) -> Result<()> {
+        print_trace(&self.trace, &self.written, self.fragments_before, console)
+    }
 }
 
 pub(super) fn run_convert(arguments: &ConvertArguments, console: &Console) -> Result<()> {
@@ -179,15 +188,15 @@ pub(super) fn run_shuffle(arguments: &ShuffleArguments, console: &Console) -> Re
 }
 
 /// The files to write, begun.
-struct Files {
+pub(super) struct Files {
     compression: Compression,
     file: OutputFile,
-    json: Option<Json>,
+    pub json: Option<Json>,
 }
 
 impl Target {
     /// Checks the files, opens the traces and begins what is written.
-    fn begin(&self, inputs: &[&Path], console: &Console) -> Result<(Vec<Trace>, Files)> {
+    pub fn begin(&self, inputs: &[&Path], console: &Console) -> Result<(Vec<Trace>, Files)> {
         let outputs: Vec<&Path> = [&*self.output].into_iter().chain(self.json.path()).collect();
         check(inputs, &outputs)?;
         check_output(&self.output, Kind::Trace)?;
@@ -204,8 +213,19 @@ impl Target {
 }
 
 impl Files {
-    /// Writes the new trace, and says so. What of the old ones no trace has is named.
+    /// Writes the new trace, and says so.
     fn save(self, edit: &dyn Edit, traces: &[Trace], console: &Console) -> Result<()> {
+        let (document, json) = self.write(edit, traces, console)?;
+        report(json, "screendoor.edit", &document, console, || document.print(console))
+    }
+
+    /// Writes the new trace; what there is to say of it. What of the old ones no trace has is named.
+    pub fn write<'a>(
+        self,
+        edit: &dyn Edit,
+        traces: &'a [Trace],
+        console: &Console,
+    ) -> Result<(Document<'a>, Option<Json>)> {
         let Files { compression, file, json } = self;
         for trace in traces {
             let lost = trace.extra_columns().iter().map(|(name, _)| format!("column '{name}'"));
@@ -244,11 +264,10 @@ impl Files {
             fragments: written.rows,
             rounded,
             bytes: written.bytes,
-            content: &written.content,
+            content: written.content.clone(),
+            written,
         };
-        report(json, "screendoor.edit", &document, console, || {
-            print_trace(&document.trace, &written, before, console)
-        })
+        Ok((document, json))
     }
 }
 

@@ -17,6 +17,7 @@ mod replay;
 mod report;
 mod reproduce;
 mod scenes;
+mod shade;
 mod signals;
 mod stress;
 mod study;
@@ -69,6 +70,7 @@ enum Command {
     Trim(edit::TrimArguments),
     Join(edit::JoinArguments),
     Shuffle(edit::ShuffleArguments),
+    Shade(shade::Arguments),
     Reproduce(reproduce::Arguments),
     Stress(stress::Arguments),
 }
@@ -166,6 +168,7 @@ fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         Command::Trim(a) => edit::run_trim(a, console),
         Command::Join(a) => edit::run_join(a, console),
         Command::Shuffle(a) => edit::run_shuffle(a, console),
+        Command::Shade(a) => shade::run(a, console),
         Command::Reproduce(a) => reproduce::run(a, console),
         Command::Stress(a) => stress::run(a, console),
     }

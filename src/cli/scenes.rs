@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use crate::capture::{RULE_SETS, RuleSet, SPLAT_PARAMS};
+use crate::capture::{LIGHTS, LightKind, RULE_SETS, RuleSet, SPLAT_PARAMS};
 use crate::cli::console::Console;
 use crate::cli::designs::print_params;
 use crate::cli::files::{JsonArgument, report};
@@ -10,7 +10,7 @@ use crate::error::Result;
 use crate::param::Param;
 use crate::scene::builtin::{BUILTINS, Builtin};
 
-/// List the built-in scenes and their parameters, and the rules by which splats are drawn
+/// List the built-in scenes and their parameters, the rules by which splats are drawn, and lights
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     #[command(flatten)]
@@ -22,6 +22,7 @@ struct List<'a> {
     scenes: &'a [Document],
     splat_rules: &'a [Rules],
     splat_parameters: &'a [Param],
+    lights: &'a [Document],
 }
 
 #[derive(serde::Serialize)]
@@ -47,7 +48,14 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         help: set.help,
         settings: set.settings.iter().copied().collect(),
     });
-    let list = List { scenes: &documents, splat_rules: &rules, splat_parameters: &SPLAT_PARAMS };
+    let document = |l: LightKind| Document { name: l.name, summary: l.help, params: l.params };
+    let lights: Vec<Document> = LIGHTS.map(document).into();
+    let list = List {
+        scenes: &documents,
+        splat_rules: &rules,
+        splat_parameters: &SPLAT_PARAMS,
+        lights: &lights,
+    };
     report(json, "screendoor.scenes", &list, console, || {
         for scene in BUILTINS {
             console.print(format_args!("builtin:{}\n  {}", scene.name, scene.summary))?;
@@ -60,6 +68,11 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
             console.print(format_args!("  {name}: {help}{set}"))?;
         }
         print_params(&SPLAT_PARAMS, console)?;
+        console.print(format_args!("capture --light NAME"))?;
+        for LightKind { name, help, params } in LIGHTS {
+            console.print(format_args!("  {name}: {help}"))?;
+            print_params(params, console)?;
+        }
         Ok(())
     })
 }

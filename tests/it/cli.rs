@@ -4,6 +4,7 @@ mod compare;
 mod edits;
 mod gpu;
 mod outputs;
+mod shade;
 mod study;
 mod told;
 mod traps;

@@ -147,6 +147,8 @@ fn parameters(value: &Value) -> usize {
 fn every_command_writes_json_with_a_schema_and_typed_parameters() {
     let place = with_study();
     place.good(&["replay", "t.arrow", "-o", "a.exr"]);
+    let lit = ["capture", "builtin:glass", "-o", "c.arrow", "--size", "16x16", "--light", "key"];
+    place.good(&[&lit[..], &["--light-trace", "l.arrow", "--light-size", "16x16"]].concat());
     // A command, and whether it tells of parameters.
     let commands: &[(&[&str], bool)] = &[
         (&["capture", "builtin:ramps", "-o", "x.arrow", "--size", "9x9"], false),
@@ -157,6 +159,7 @@ fn every_command_writes_json_with_a_schema_and_typed_parameters() {
         (&["trim", "t.arrow", "-o", "e.arrow", "--samples", "2"], false),
         (&["join", "t.arrow", "t.arrow", "-o", "e.arrow"], false),
         (&["shuffle", "t.arrow", "-o", "e.arrow"], false),
+        (&["shade", "c.arrow", "l.arrow", "-o", "e.arrow", "--samples", "4"], true),
         (&["replay", "t.arrow", "--design", "slab", "--samples", "4"], true),
         (&["compare", "a.exr", "a.exr"], false),
         (&["explain", "t.arrow", "--pixel", "24,36", "--samples", "4"], true),
@@ -188,7 +191,7 @@ fn every_command_writes_json_with_a_schema_and_typed_parameters() {
     }
     // Some commands write one document: those of studies, and those that write traces anew.
     schemas.dedup();
-    assert_eq!(schemas.len(), 13);
+    assert_eq!(schemas.len(), 14);
     // The list is whole: a command has --json, or prints no figures.
     for name in crate::measured::commands() {
         let tried = commands.iter().any(|(arguments, _)| arguments[0] == name);

@@ -65,6 +65,7 @@ const HELD: &[Held] = &[
     ("trim", &[edits::memory_is_what_was_allowed_and_a_constant]),
     ("join", &[edits::memory_is_what_was_allowed_and_a_constant]),
     ("shuffle", &[edits::memory_is_what_was_allowed_and_a_constant]),
+    ("shade", &[traces::memory_is_what_was_allowed_and_a_constant]),
     ("reproduce", &[studies::the_smallest_reproduction]),
     ("stress", &[crate::stress::nothing_that_is_promised_is_broken_and_nothing_is_lost]),
 ];

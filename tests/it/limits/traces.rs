@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
+use screendoor::capture::DIRECT;
 use screendoor::design::DESIGNS;
 use screendoor::trace::{
     DepthPlane, Fragment, Header, SampleMask, TraceWriter, Unorm32, WriteOptions,
@@ -70,7 +71,15 @@ fn hold_all(deep: u32, spread: u32, memory: u64) {
     write(&folder.join("deep.arrow"), &header, deep, |_| (100, 100));
     write(&folder.join("many.arrow"), &header, spread, many);
     let allowed = memory.to_string();
+    let mut lit = header.clone();
+    lit.optional = DIRECT.into_iter().collect();
+    write(&folder.join("lit.arrow"), &lit, spread, many);
     for trace in ["deep.arrow", "many.arrow"] {
+        for design in ["lk", "mlab", "exact"] {
+            let shade = ["shade", "lit.arrow", trace, "-o", "shaded.arrow", "--design", design];
+            let run = Run::of(folder, &[&shade[..], &["--memory", &allowed]].concat());
+            run.is_within(memory, &format!("shade by {design} from {trace}"));
+        }
         for design in DESIGNS {
             let name = design.info.name;
             let run = Run::of(folder, &["replay", trace, "-d", name, "--memory", &allowed]);

@@ -14,7 +14,7 @@ use crate::capture::raster::Raster;
 use crate::capture::scan::Covered;
 use crate::capture::setup::STEPS;
 use crate::capture::shade::{
-    AMBIENT, FILL_STRENGTH, KEY_STRENGTH, LEAST_ALPHA, MOST_COLOUR, Shader,
+    AMBIENT, FILL_STRENGTH, KEY_STRENGTH, LEAST_ALPHA, MOST_COLOUR, Shaded, Shader,
 };
 use crate::scene::{AlphaMode, Material, TextureUse};
 use screendoor_trace::picture::Space;
@@ -50,6 +50,16 @@ struct Weights<S: Simd> {
     at: [Doubles<S>; 3],
     /// Of the second and the third vertex alone, to the right and downwards.
     changes: [[Singles<S>; 2]; 2],
+}
+
+/// What shading finds of fragments.
+struct Lit<S: Simd> {
+    colour: [Singles<S>; 3],
+    /// What of that is the key light's, where it is asked for.
+    direct: Option<[Singles<S>; 3]>,
+    alpha: Singles<S>,
+    /// A bit for each fragment that there is.
+    kept: u64,
 }
 
 /// Two vectors, each by a number.
@@ -138,8 +148,10 @@ impl<'p> Batch<'p> {
             || material.transmission_texture.is_some()
             || material.emissive_texture.is_some();
         let weights = self.weights(simd, textured);
-        let (colour, alpha, kept) = self.colours(simd, material, &weights);
+        let Lit { colour, direct, alpha, kept } = self.colours(simd, material, &weights);
         let colour: [[f32; LANES]; 3] = [colour[0].into(), colour[1].into(), colour[2].into()];
+        let direct =
+            direct.map(|[r, g, b]| -> [[f32; LANES]; 3] { [r.into(), g.into(), b.into()] });
         let alpha: [f32; LANES] = alpha.into();
         let [x, y] = self.hits.pixels;
         let space = self.shader.space;
@@ -155,15 +167,16 @@ impl<'p> Batch<'p> {
             if space != Space::Linear {
                 colour = colour.map(|c| space.of_linear(f64::from(c)) as f32);
             }
-            fragments.push(Fragment {
+            let mut fragment = Fragment {
                 x: x[i],
                 y: y[i],
                 coverage: self.hits.coverage[i],
                 depth: depths[i],
-                colour,
-                alpha: alpha[i],
                 ..of
-            });
+            };
+            let direct = direct.map_or([0.0; 3], |direct| direct.map(|channel| channel[i]));
+            Shaded { colour, alpha: alpha[i], direct }.put(&mut fragment);
+            fragments.push(fragment);
         }
     }
 
@@ -259,14 +272,9 @@ impl<'p> Batch<'p> {
         sum
     }
 
-    /// Colours, alphas and a bit for each fragment that there is.
+    /// What shading finds.
     #[inline(always)]
-    fn colours<S: Simd>(
-        &self,
-        simd: S,
-        material: &Material,
-        weights: &Weights<S>,
-    ) -> ([Singles<S>; 3], Singles<S>, u64) {
+    fn colours<S: Simd>(&self, simd: S, material: &Material, weights: &Weights<S>) -> Lit<S> {
         let [a, b, c] = &self.triangle.vertices;
         let at = three(
             #[inline(always)]
@@ -317,8 +325,15 @@ impl<'p> Batch<'p> {
         let kept = alpha.simd_ge(LEAST_ALPHA).to_bitmask() & !cut;
         let alpha = at_most(simd, alpha, 1.0);
         let mut colour = [base[0], base[1], base[2]];
+        let mut direct = None;
         if !material.unlit {
-            let light = self.light(simd, weights.at, at);
+            let [light, key] = self.light(simd, weights.at, at);
+            if self.shader.apart {
+                direct = Some(three(
+                    #[inline(always)]
+                    |k| at_most(simd, at_least(simd, colour[k] * key, 0.0), MOST_COLOUR),
+                ));
+            }
             colour = three(
                 #[inline(always)]
                 |k| colour[k] * light,
@@ -336,7 +351,7 @@ impl<'p> Batch<'p> {
             #[inline(always)]
             |k| at_most(simd, at_least(simd, colour[k] + glow[k], 0.0), MOST_COLOUR),
         );
-        (colour, alpha, kept)
+        Lit { colour, direct, alpha, kept }
     }
 
     /// What the texture has at each fragment.
@@ -387,7 +402,7 @@ impl<'p> Batch<'p> {
         simd: S,
         weights: [Doubles<S>; 3],
         narrow_weights: [Singles<S>; 3],
-    ) -> Singles<S> {
+    ) -> [Singles<S>; 2] {
         let [a, b, c] = &self.triangle.vertices;
         let camera = self.shader.camera;
         let w = narrow_weights;
@@ -423,6 +438,7 @@ impl<'p> Batch<'p> {
         );
         let key = at_least(simd, dot_with(simd, normal, self.shader.key), 0.0);
         let fill = at_least(simd, dot_with(simd, normal, self.shader.fill), 0.0);
-        key * KEY_STRENGTH + AMBIENT + fill * FILL_STRENGTH
+        let key = key * KEY_STRENGTH;
+        [key + AMBIENT + fill * FILL_STRENGTH, key]
     }
 }

@@ -130,19 +130,11 @@ impl SetUp<'_> {
             None => (depth, Weights { at: [1.0 / 3.0; 3], dx: [0.0; 3], dy: [0.0; 3] }),
         };
         let triangle = &self.triangle;
-        let (colour, alpha) = self.drawing.shader.shade(triangle, &weights)?;
         let (primitive, object) = (triangle.primitive, triangle.object);
-        Some(Fragment {
-            x,
-            y,
-            coverage,
-            depth,
-            colour,
-            alpha,
-            primitive,
-            object,
-            ..Fragment::default()
-        })
+        let mut fragment =
+            Fragment { x, y, coverage, depth, primitive, object, ..Fragment::default() };
+        self.drawing.shader.shade(triangle, &weights)?.put(&mut fragment);
+        Some(fragment)
     }
 
     /// What our own rasteriser finds: pixels, what is covered of each and the depth there.

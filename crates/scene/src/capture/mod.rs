@@ -16,6 +16,7 @@ mod covered;
 mod geometry;
 mod job;
 mod lanes;
+mod light;
 mod order;
 mod pattern;
 #[cfg(test)]
@@ -31,10 +32,12 @@ mod unseen;
 use std::io::Write;
 
 use fearless_simd::Level;
+use glam::DVec3;
 use rayon::prelude::*;
 
 pub use camera::{Camera, CameraChoice, CameraOptions, Chosen, Pose};
 pub use covered::{Drawing, SetUp};
+pub use light::{DIRECT, DIRECT_COLUMNS, LIGHTS, Light, LightKind};
 pub use order::Order;
 pub use pattern::{PatternKind, pattern};
 pub use splat::{OnFrame as SplatOnFrame, PARAMS as SPLAT_PARAMS, RULE_SETS, RuleSet, SplatRules};
@@ -93,6 +96,8 @@ pub struct CaptureOptions {
     pub splats: SplatRules,
     /// What the trace's colours stand for; where not given, encoded for splats and else linear.
     pub space: Option<Space>,
+    /// The light of which it is recorded what of each colour comes from it; none where not given.
+    pub light: Option<Light>,
 }
 
 impl Default for CaptureOptions {
@@ -111,6 +116,7 @@ impl Default for CaptureOptions {
             camera: CameraOptions::default(),
             splats: SplatRules::default(),
             space: None,
+            light: None,
         }
     }
 }
@@ -187,7 +193,13 @@ impl<'a> Capture<'a> {
         if scene.objects.len() == 1 {
             header.constants.insert(ColumnId::Object, Scalar::Unsigned(0));
         }
-        if let Some(alpha) = Shader::new(scene, &camera, options.alpha, space).constant_alpha() {
+        if let Some(light) = options.light {
+            light.check(scene, space)?;
+            header.optional.extend(DIRECT);
+            header.source.push_str(&format!(", light {}", light.spec()));
+        }
+        let shader = Shader::new(scene, &camera, options.alpha, space, options.light);
+        if let Some(alpha) = shader.constant_alpha() {
             header.constants.insert(ColumnId::Alpha, Scalar::Real(alpha));
         }
         let recorded = Recorded::new(scene.objects.len());
@@ -321,7 +333,13 @@ impl<'a> Capture<'a> {
     }
 
     fn shader(&self) -> Shader<'_> {
-        Shader::new(self.scene, &self.camera, self.options.alpha, self.header.space)
+        let CaptureOptions { alpha, light, .. } = *self.options;
+        Shader::new(self.scene, &self.camera, alpha, self.header.space, light)
+    }
+
+    /// The unit vector towards the key light where none is given, in the scene's space.
+    fn key(&self) -> DVec3 {
+        light::turned(&self.camera, shade::KEY)
     }
 
     fn tools(&self) -> Tools<'_> {

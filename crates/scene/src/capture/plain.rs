@@ -6,7 +6,7 @@ use glam::{Vec2, Vec3, Vec4};
 use super::geometry::Geometry;
 use super::job::{Drawn, Tools, cut_into_jobs};
 use super::lanes::levels;
-use super::{CameraOptions, Capture, CaptureOptions};
+use super::{CameraOptions, Capture, CaptureOptions, Light};
 use crate::scene::{AlphaMode, Material, Mesh, Scene, Shape, TextureUse, load};
 use screendoor_trace::random::Stream;
 use screendoor_trace::trace::Fragment;
@@ -23,20 +23,20 @@ fn plain(drawn: &[Drawn], tools: &Tools<'_>) -> Vec<Fragment> {
             for y in first..=last {
                 raster.row(y, |hit| {
                     let weights = raster.weights(hit.shade_at);
-                    let Some((colour, alpha)) = tools.shader.shade(triangle, &weights) else {
+                    let Some(shaded) = tools.shader.shade(triangle, &weights) else {
                         return;
                     };
-                    fragments.push(Fragment {
+                    let mut fragment = Fragment {
                         x: hit.x,
                         y: hit.y,
                         coverage: hit.coverage,
                         depth: hit.depth,
-                        colour,
-                        alpha,
                         primitive: triangle.primitive,
                         object: triangle.object,
                         ..Fragment::default()
-                    });
+                    };
+                    shaded.put(&mut fragment);
+                    fragments.push(fragment);
                 });
             }
         }
@@ -78,6 +78,7 @@ fn scenes_are_drawn_as_the_plain_text_says() {
                 height: 30,
                 samples,
                 alpha,
+                light: [None, Some(Light::Key), Some(Light::Directional([70.0, 20.0]))][i % 3],
                 ..CaptureOptions::default()
             };
             assert!(check(&scene, &options) > 100, "{name}");

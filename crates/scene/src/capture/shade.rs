@@ -1,18 +1,20 @@
 //! Colour and alpha of a fragment.
 
-use glam::{DVec3, Vec2, Vec3, Vec4};
+use glam::{Vec2, Vec3, Vec4};
 
 use crate::capture::camera::Camera;
 use crate::capture::geometry::Triangle;
+use crate::capture::light::{Light, turned};
 use crate::capture::raster::Weights;
 use crate::scene::{AlphaMode, Material, Scene, TextureUse};
 use screendoor_trace::picture::Space;
+use screendoor_trace::trace::Fragment;
 
 /// Light: a directional one that moves with the camera, a weaker one from the
 /// other side, and a little from everywhere.
-const KEY: Vec3 = Vec3::new(0.45, 0.65, 0.61);
+pub(super) const KEY: [f32; 3] = [0.45, 0.65, 0.61];
 pub(super) const KEY_STRENGTH: f32 = 0.75;
-const FILL: Vec3 = Vec3::new(-0.75, 0.10, 0.65);
+const FILL: [f32; 3] = [-0.75, 0.10, 0.65];
 pub(super) const FILL_STRENGTH: f32 = 0.15;
 pub(super) const AMBIENT: f32 = 0.10;
 
@@ -22,6 +24,24 @@ pub(super) const LEAST_ALPHA: f32 = 0.5 / 65535.0;
 /// The greatest colour: beyond half precision there is no need to go.
 pub(super) const MOST_COLOUR: f32 = 65504.0;
 
+/// What shading makes of a fragment.
+pub(super) struct Shaded {
+    pub(super) colour: [f32; 3],
+    pub(super) alpha: f32,
+    /// What of the colour comes from the key light, where that is asked for; else nothing.
+    pub(super) direct: [f32; 3],
+}
+
+impl Shaded {
+    /// Puts it into a fragment.
+    pub(super) fn put(self, fragment: &mut Fragment) {
+        fragment.colour = self.colour;
+        fragment.alpha = self.alpha;
+        let optional = &mut fragment.optional;
+        [optional.direct_r, optional.direct_g, optional.direct_b] = self.direct;
+    }
+}
+
 /// Shades fragments of a scene.
 pub(crate) struct Shader<'a> {
     pub(super) scene: &'a Scene,
@@ -29,6 +49,8 @@ pub(crate) struct Shader<'a> {
     /// Unit vectors towards the lights, in the scene's space.
     pub(super) key: Vec3,
     pub(super) fill: Vec3,
+    /// Whether the key light's part of colours is asked for.
+    pub(super) apart: bool,
     pub(super) alpha: Option<f32>,
     /// What the trace's colours stand for.
     pub(super) space: Space,
@@ -36,19 +58,18 @@ pub(crate) struct Shader<'a> {
 
 impl<'a> Shader<'a> {
     /// `alpha`, where given, replaces the materials' own; texture alphas still
-    /// multiply it.
+    /// multiply it. `light`, where given, is the key light.
     pub(super) fn new(
         scene: &'a Scene,
         camera: &'a Camera,
         alpha: Option<f32>,
         space: Space,
+        light: Option<Light>,
     ) -> Self {
-        let turn = |light: Vec3| {
-            let l = light.as_dvec3();
-            let turned = camera.right * l.x + camera.up * l.y + camera.back * l.z;
-            turned.normalize_or(DVec3::Z).as_vec3()
-        };
-        Shader { scene, camera, key: turn(KEY), fill: turn(FILL), alpha, space }
+        let key = turned(camera, KEY);
+        let key = light.map_or(key, |light| light.towards(key)).as_vec3();
+        let fill = turned(camera, FILL).as_vec3();
+        Shader { scene, camera, key, fill, apart: light.is_some(), alpha, space }
     }
 
     /// Material `index`.
@@ -95,7 +116,7 @@ impl<'a> Shader<'a> {
     /// have these weights; `None` where there is nothing: an alpha of 0 or next to
     /// it, or cut out by a mask. The plain text of what [`Batch`](crate::capture::batch::Batch)
     /// does with several at a time.
-    pub(super) fn shade(&self, triangle: &Triangle, weights: &Weights) -> Option<([f32; 3], f32)> {
+    pub(super) fn shade(&self, triangle: &Triangle, weights: &Weights) -> Option<Shaded> {
         let material = self.material(triangle.material);
         let [a, b, c] = &triangle.vertices;
         // From the first vertex on, so that what is equal at all three stays exactly that.
@@ -141,8 +162,14 @@ impl<'a> Shader<'a> {
         }
 
         let mut colour = base.truncate();
+        let mut direct = [0.0; 3];
         if !material.unlit {
-            colour *= self.light(triangle, weights);
+            let [light, key] = self.light(triangle, weights);
+            if self.apart {
+                let part = (colour * key).clamp(Vec3::ZERO, Vec3::splat(MOST_COLOUR));
+                direct = part.to_array();
+            }
+            colour *= light;
         }
         let glow = material.emissive_texture.map_or(Vec3::ONE, |t| texel(t).truncate());
         colour += material.emissive * glow;
@@ -152,12 +179,12 @@ impl<'a> Shader<'a> {
             Space::Linear => colour,
             space => colour.map(|c| space.of_linear(f64::from(c)) as f32),
         };
-        Some((colour, alpha))
+        Some(Shaded { colour, alpha, direct })
     }
 
     /// The light that a diffuse surface reflects towards the camera, per unit of
-    /// its colour: the side that faces the camera is lit.
-    fn light(&self, triangle: &Triangle, weights: &Weights) -> f32 {
+    /// its colour: the side that faces the camera is lit. Beside it the key light's part.
+    fn light(&self, triangle: &Triangle, weights: &Weights) -> [f32; 2] {
         let [a, b, c] = &triangle.vertices;
         let w = weights.at;
         let normal = a.normal * w[0] as f32 + b.normal * w[1] as f32 + c.normal * w[2] as f32;
@@ -167,8 +194,7 @@ impl<'a> Shader<'a> {
         if normal.dot(towards) < 0.0 {
             normal = -normal;
         }
-        AMBIENT
-            + KEY_STRENGTH * normal.dot(self.key).max(0.0)
-            + FILL_STRENGTH * normal.dot(self.fill).max(0.0)
+        let key = KEY_STRENGTH * normal.dot(self.key).max(0.0);
+        [AMBIENT + key + FILL_STRENGTH * normal.dot(self.fill).max(0.0), key]
     }
 }

@@ -11,6 +11,7 @@ pub mod publications;
 pub mod record;
 pub mod results;
 pub mod run;
+pub mod shadows;
 pub mod stress;
 mod subject;
 pub mod throughput;

@@ -47,6 +47,12 @@ macro_rules! columns {
             }
             {
                 // Optional columns: `Id name: type = default, check, unit, meaning;`.
+                DirectR direct_r: ChannelColumn = 0.0, finite_colour,
+                    "as `r`, of which it is a part", "what of the red comes straight from a light, if nothing lies between";
+                DirectG direct_g: ChannelColumn = 0.0, finite_colour,
+                    "as `g`, of which it is a part", "the same of the green";
+                DirectB direct_b: ChannelColumn = 0.0, finite_colour,
+                    "as `b`, of which it is a part", "the same of the blue";
             }
         }
     };
@@ -232,6 +238,11 @@ impl ColumnSet {
         ColumnSet(bits)
     }
 
+    /// These without some.
+    pub const fn without(self, others: ColumnSet) -> Self {
+        ColumnSet(self.0 & !others.0)
+    }
+
     /// Whether `column` is among them.
     #[inline]
     pub const fn contains(self, column: ColumnId) -> bool {
@@ -280,6 +291,8 @@ mod tests {
                 assert_eq!(set.contains(other), other == id || other == ColumnId::Z);
             }
             assert!(ColumnSet::ALL.contains(id) && !ColumnSet::NONE.contains(id));
+            let without = ColumnSet::ALL.without(set);
+            assert!(!without.contains(id) && without.contains(ColumnId::R) == (id != ColumnId::R));
         }
     }
 
