@@ -7,8 +7,8 @@ use clap::{Arg, Args};
 use serde::Serialize;
 
 use crate::capture::{
-    CameraChoice, CameraOptions, Capture, CaptureOptions, Faces, Light, Order, PatternKind,
-    SplatRules, Unseen,
+    CameraChoice, CameraOptions, Capture, CaptureOptions, Faces, Light, Opacity, Order,
+    PatternKind, SplatRules, Unseen,
 };
 use crate::cli::arguments::{self, Change, Each, colour, numbers, option, samples, size};
 use crate::cli::console::{Console, grouped, table};
@@ -125,6 +125,10 @@ struct SceneArguments {
     /// theirs, multiplied by it
     #[arg(long, value_name = "A", allow_negative_numbers = true)]
     alpha: Option<f32>,
+    /// How opaque surfaces are by the angle at which they are seen: NAME[:parameter=value,…]
+    /// ('screendoor scenes' lists them)
+    #[arg(long, value_name = "MODEL", default_value = "constant")]
+    opacity: String,
     /// A picture (PNG, JPEG, WebP, BMP, TGA) for surfaces that have no texture
     #[arg(long, value_name = "FILE")]
     texture: Option<PathBuf>,
@@ -258,6 +262,7 @@ fn run_scene(
         let what = "--camera-name is for a file of cameras";
         return Err(Error::config(what, "name the scene's own camera by --camera alone"));
     }
+    let opacity = Opacity::parse(&arguments.opacity)?;
     let light = arguments.light.as_deref().map(Light::parse).transpose()?;
     let of_file = choice.file().map(|_| choice.choose(&[])).transpose()?;
     let gpu = arguments.gpu.then(|| Gpu::open(arguments.adapter.as_deref())).transpose()?;
@@ -304,6 +309,7 @@ fn run_scene(
         }),
         pattern: arguments.pattern,
         alpha: arguments.alpha,
+        opacity,
         order: arguments.order,
         order_seed: arguments.order_seed,
         faces: arguments.faces,

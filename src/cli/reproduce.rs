@@ -79,7 +79,7 @@ struct Part<'a> {
 /// Minutes on two processors that the parts take with the default effort, roughly: the tables
 /// (their share grows with the pixels and the seeds), the expectations (with theirs), shadow maps, the
 /// comparison of all designs, this project's own over many seeds, splats, and what programs drew.
-const MINUTES: [f64; 7] = [15.0, 7.0, 2.0, 25.0, 12.0, 3.0, 1.0];
+const MINUTES: [f64; 7] = [15.0, 7.0, 0.2, 25.0, 12.0, 3.0, 1.0];
 
 /// How long it takes on so many threads, roughly, in minutes.
 fn minutes(effort: Effort, part: Option<Publication>, threads: usize) -> f64 {

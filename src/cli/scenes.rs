@@ -2,7 +2,9 @@
 
 use clap::Args;
 
-use crate::capture::{LIGHTS, LightKind, RULE_SETS, RuleSet, SPLAT_PARAMS};
+use crate::capture::{
+    LIGHTS, LightKind, OPACITY_MODELS, OpacityModel, RULE_SETS, RuleSet, SPLAT_PARAMS,
+};
 use crate::cli::console::Console;
 use crate::cli::designs::print_params;
 use crate::cli::files::{JsonArgument, report};
@@ -10,7 +12,7 @@ use crate::error::Result;
 use crate::param::Param;
 use crate::scene::builtin::{BUILTINS, Builtin};
 
-/// List the built-in scenes and their parameters, the rules by which splats are drawn, and lights
+/// List the built-in scenes and their parameters, the rules by which splats are drawn, lights and models of opacity
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     #[command(flatten)]
@@ -23,6 +25,7 @@ struct List<'a> {
     splat_rules: &'a [Rules],
     splat_parameters: &'a [Param],
     lights: &'a [Document],
+    opacity_models: &'a [Document],
 }
 
 #[derive(serde::Serialize)]
@@ -50,11 +53,14 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     });
     let document = |l: LightKind| Document { name: l.name, summary: l.help, params: l.params };
     let lights: Vec<Document> = LIGHTS.map(document).into();
+    let document = |m: OpacityModel| Document { name: m.name, summary: m.help, params: m.params };
+    let models: Vec<Document> = OPACITY_MODELS.map(document).into();
     let list = List {
         scenes: &documents,
         splat_rules: &rules,
         splat_parameters: &SPLAT_PARAMS,
         lights: &lights,
+        opacity_models: &models,
     };
     report(json, "screendoor.scenes", &list, console, || {
         for scene in BUILTINS {
@@ -70,6 +76,11 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         print_params(&SPLAT_PARAMS, console)?;
         console.print(format_args!("capture --light NAME"))?;
         for LightKind { name, help, params } in LIGHTS {
+            console.print(format_args!("  {name}: {help}"))?;
+            print_params(params, console)?;
+        }
+        console.print(format_args!("capture --opacity NAME"))?;
+        for OpacityModel { name, help, params } in OPACITY_MODELS {
             console.print(format_args!("  {name}: {help}"))?;
             print_params(params, console)?;
         }

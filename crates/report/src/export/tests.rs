@@ -219,6 +219,7 @@ fn whole_scene(small: &SceneEntry) -> SceneEntry {
         camera: Some(String::new()),
         camera_name: Some(String::new()),
         splat_rules: Some(String::new()),
+        opacity: Some(String::new()),
         axes: Some(Default::default()),
         line_width: Some(1.0),
         space: Some(Default::default()),

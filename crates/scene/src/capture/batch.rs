@@ -322,12 +322,20 @@ impl<'p> Batch<'p> {
             let through = share * material.transmission.clamp(0.0, 1.0);
             alpha *= 1.0 - through * tint;
         }
+        let varies = self.shader.opacity.varies();
+        let seen = (varies || !material.unlit).then(
+            #[inline(always)]
+            || self.seen(simd, weights.at, at),
+        );
+        if let Some((_, facing)) = seen.filter(|_| varies) {
+            alpha = self.varied(simd, alpha, facing);
+        }
         let kept = alpha.simd_ge(LEAST_ALPHA).to_bitmask() & !cut;
         let alpha = at_most(simd, alpha, 1.0);
         let mut colour = [base[0], base[1], base[2]];
         let mut direct = None;
-        if !material.unlit {
-            let [light, key] = self.light(simd, weights.at, at);
+        if let Some((normal, _)) = seen.filter(|_| !material.unlit) {
+            let [light, key] = self.light(simd, normal);
             if self.shader.apart {
                 direct = Some(three(
                     #[inline(always)]
@@ -395,14 +403,24 @@ impl<'p> Batch<'p> {
         )
     }
 
-    /// [`Shader::light`].
+    /// Alphas by the angle at which the surface is seen, one by one: nobody else asks for powers.
+    #[inline(never)]
+    fn varied<S: Simd>(&self, simd: S, alpha: Singles<S>, facing: Singles<S>) -> Singles<S> {
+        let (mut alphas, facing): ([f32; LANES], [f32; LANES]) = (alpha.into(), facing.into());
+        for (alpha, facing) in alphas.iter_mut().zip(facing) {
+            *alpha = self.shader.opacity.alpha(alpha.clamp(0.0, 1.0), facing);
+        }
+        Singles::from_slice(simd, &alphas)
+    }
+
+    /// [`Shader::seen`].
     #[inline(always)]
-    fn light<S: Simd>(
+    fn seen<S: Simd>(
         &self,
         simd: S,
         weights: [Doubles<S>; 3],
         narrow_weights: [Singles<S>; 3],
-    ) -> [Singles<S>; 2] {
+    ) -> ([Singles<S>; 3], Singles<S>) {
         let [a, b, c] = &self.triangle.vertices;
         let camera = self.shader.camera;
         let w = narrow_weights;
@@ -436,6 +454,12 @@ impl<'p> Batch<'p> {
             #[inline(always)]
             |k| away.select(-normal[k], normal[k]),
         );
+        (normal, away.select(-facing, facing))
+    }
+
+    /// [`Shader::light`].
+    #[inline(always)]
+    fn light<S: Simd>(&self, simd: S, normal: [Singles<S>; 3]) -> [Singles<S>; 2] {
         let key = at_least(simd, dot_with(simd, normal, self.shader.key), 0.0);
         let fill = at_least(simd, dot_with(simd, normal, self.shader.fill), 0.0);
         let key = key * KEY_STRENGTH;

@@ -17,6 +17,7 @@ mod geometry;
 mod job;
 mod lanes;
 mod light;
+mod opacity;
 mod order;
 mod pattern;
 #[cfg(test)]
@@ -38,6 +39,7 @@ use rayon::prelude::*;
 pub use camera::{Camera, CameraChoice, CameraOptions, Chosen, Pose};
 pub use covered::{Drawing, SetUp};
 pub use light::{DIRECT, DIRECT_COLUMNS, LIGHTS, Light, LightKind};
+pub use opacity::{Cosine, OPACITY_MODELS, Opacity, OpacityModel};
 pub use order::Order;
 pub use pattern::{PatternKind, pattern};
 pub use splat::{OnFrame as SplatOnFrame, PARAMS as SPLAT_PARAMS, RULE_SETS, RuleSet, SplatRules};
@@ -80,6 +82,8 @@ pub struct CaptureOptions {
     pub pattern: PatternKind,
     /// An alpha in place of the materials' own; texture alphas still multiply it.
     pub alpha: Option<f32>,
+    /// How opaque surfaces are by the angle at which they are seen; splats have it in their alphas.
+    pub opacity: Opacity,
     /// The order in which triangles and splats are drawn.
     pub order: Order,
     /// Which shuffle a random order takes.
@@ -108,6 +112,7 @@ impl Default for CaptureOptions {
             samples: 64,
             pattern: PatternKind::Auto,
             alpha: None,
+            opacity: Opacity::Constant,
             order: Order::Api,
             order_seed: 0,
             faces: Faces::Material,
@@ -130,6 +135,10 @@ impl CaptureOptions {
                 "splats have no sides: faces '{}' changes nothing",
                 self.faces.name()
             ));
+        }
+        if self.opacity.varies() && scene.is_all_splats() {
+            let opacity = self.opacity.spec();
+            told.push(format!("splats have no surface: opacity '{opacity}' changes nothing"));
         }
         if self.splats != SplatRules::default() && !scene.has_splats() {
             let rules = self.splats.spec();
@@ -179,6 +188,9 @@ impl<'a> Capture<'a> {
         if let Some(alpha) = options.alpha {
             header.source.push_str(&format!(", alpha {alpha}"));
         }
+        if options.opacity.varies() {
+            header.source.push_str(&format!(", opacity {}", options.opacity.spec()));
+        }
         match options.order {
             Order::Api => {}
             Order::Random => {
@@ -198,7 +210,7 @@ impl<'a> Capture<'a> {
             header.optional.extend(DIRECT);
             header.source.push_str(&format!(", light {}", light.spec()));
         }
-        let shader = Shader::new(scene, &camera, options.alpha, space, options.light);
+        let shader = Shader::new(scene, &camera, options, space);
         if let Some(alpha) = shader.constant_alpha() {
             header.constants.insert(ColumnId::Alpha, Scalar::Real(alpha));
         }
@@ -333,8 +345,7 @@ impl<'a> Capture<'a> {
     }
 
     fn shader(&self) -> Shader<'_> {
-        let CaptureOptions { alpha, light, .. } = *self.options;
-        Shader::new(self.scene, &self.camera, alpha, self.header.space, light)
+        Shader::new(self.scene, &self.camera, self.options, self.header.space)
     }
 
     /// The unit vector towards the key light where none is given, in the scene's space.

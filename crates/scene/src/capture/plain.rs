@@ -6,7 +6,7 @@ use glam::{Vec2, Vec3, Vec4};
 use super::geometry::Geometry;
 use super::job::{Drawn, Tools, cut_into_jobs};
 use super::lanes::levels;
-use super::{CameraOptions, Capture, CaptureOptions, Light};
+use super::{CameraOptions, Capture, CaptureOptions, Light, Opacity};
 use crate::scene::{AlphaMode, Material, Mesh, Scene, Shape, TextureUse, load};
 use screendoor_trace::random::Stream;
 use screendoor_trace::trace::Fragment;
@@ -78,6 +78,10 @@ fn scenes_are_drawn_as_the_plain_text_says() {
                 height: 30,
                 samples,
                 alpha,
+                opacity: Opacity::parse(
+                    ["constant", "thickness", "crow", "crow-printed:power=3"][i % 4],
+                )
+                .unwrap(),
                 light: [None, Some(Light::Key), Some(Light::Directional([70.0, 20.0]))][i % 3],
                 ..CaptureOptions::default()
             };

@@ -2,9 +2,11 @@
 
 use glam::{Vec2, Vec3, Vec4};
 
+use crate::capture::CaptureOptions;
 use crate::capture::camera::Camera;
 use crate::capture::geometry::Triangle;
-use crate::capture::light::{Light, turned};
+use crate::capture::light::turned;
+use crate::capture::opacity::Opacity;
 use crate::capture::raster::Weights;
 use crate::scene::{AlphaMode, Material, Scene, TextureUse};
 use screendoor_trace::picture::Space;
@@ -52,24 +54,26 @@ pub(crate) struct Shader<'a> {
     /// Whether the key light's part of colours is asked for.
     pub(super) apart: bool,
     pub(super) alpha: Option<f32>,
+    /// How it changes with the angle.
+    pub(super) opacity: Opacity,
     /// What the trace's colours stand for.
     pub(super) space: Space,
 }
 
 impl<'a> Shader<'a> {
-    /// `alpha`, where given, replaces the materials' own; texture alphas still
-    /// multiply it. `light`, where given, is the key light.
+    /// An alpha that is given replaces the materials' own; texture alphas still
+    /// multiply it. A light that is given is the key light.
     pub(super) fn new(
         scene: &'a Scene,
         camera: &'a Camera,
-        alpha: Option<f32>,
+        options: &CaptureOptions,
         space: Space,
-        light: Option<Light>,
     ) -> Self {
+        let CaptureOptions { alpha, light, opacity, .. } = *options;
         let key = turned(camera, KEY);
         let key = light.map_or(key, |light| light.towards(key)).as_vec3();
         let fill = turned(camera, FILL).as_vec3();
-        Shader { scene, camera, key, fill, apart: light.is_some(), alpha, space }
+        Shader { scene, camera, key, fill, apart: light.is_some(), alpha, opacity, space }
     }
 
     /// Material `index`.
@@ -79,6 +83,9 @@ impl<'a> Shader<'a> {
 
     /// The one alpha that every fragment of the scene has, if there is one.
     pub(super) fn constant_alpha(&self) -> Option<f32> {
+        if self.opacity.varies() {
+            return None;
+        }
         let mut common = None;
         for shape in &self.scene.shapes {
             let material = self.material(shape.material());
@@ -156,15 +163,19 @@ impl<'a> Shader<'a> {
             let through = material.transmission.clamp(0.0, 1.0) * share;
             alpha *= 1.0 - through * tint.clamp(0.0, 1.0);
         }
-        let alpha = alpha.clamp(0.0, 1.0);
+        let mut alpha = alpha.clamp(0.0, 1.0);
+        let seen = (self.opacity.varies() || !material.unlit).then(|| self.seen(triangle, weights));
+        if let Some((_, facing)) = seen.filter(|_| self.opacity.varies()) {
+            alpha = self.opacity.alpha(alpha, facing);
+        }
         if alpha.is_nan() || alpha < LEAST_ALPHA {
             return None;
         }
 
         let mut colour = base.truncate();
         let mut direct = [0.0; 3];
-        if !material.unlit {
-            let [light, key] = self.light(triangle, weights);
+        if let Some((normal, _)) = seen.filter(|_| !material.unlit) {
+            let [light, key] = self.light(normal);
             if self.apart {
                 let part = (colour * key).clamp(Vec3::ZERO, Vec3::splat(MOST_COLOUR));
                 direct = part.to_array();
@@ -182,18 +193,21 @@ impl<'a> Shader<'a> {
         Some(Shaded { colour, alpha, direct })
     }
 
-    /// The light that a diffuse surface reflects towards the camera, per unit of
-    /// its colour: the side that faces the camera is lit. Beside it the key light's part.
-    fn light(&self, triangle: &Triangle, weights: &Weights) -> [f32; 2] {
+    /// The normal on the side that the camera sees, and its cosine with the way there.
+    fn seen(&self, triangle: &Triangle, weights: &Weights) -> (Vec3, f32) {
         let [a, b, c] = &triangle.vertices;
         let w = weights.at;
         let normal = a.normal * w[0] as f32 + b.normal * w[1] as f32 + c.normal * w[2] as f32;
         let point = a.position * w[0] + b.position * w[1] + c.position * w[2];
         let towards = self.camera.towards(point).as_vec3();
-        let mut normal = normal.normalize_or(towards);
-        if normal.dot(towards) < 0.0 {
-            normal = -normal;
-        }
+        let normal = normal.normalize_or(towards);
+        let facing = normal.dot(towards);
+        if facing < 0.0 { (-normal, -facing) } else { (normal, facing) }
+    }
+
+    /// The light that a diffuse surface with this normal reflects towards the camera, per unit of
+    /// its colour. Beside it the key light's part.
+    fn light(&self, normal: Vec3) -> [f32; 2] {
         let key = KEY_STRENGTH * normal.dot(self.key).max(0.0);
         [AMBIENT + key + FILL_STRENGTH * normal.dot(self.fill).max(0.0), key]
     }

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::study::file::{SceneEntry, Study};
-use screendoor_scene::capture::{SplatRules, pattern};
+use screendoor_scene::capture::{Opacity, SplatRules, pattern};
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::trace::{MAX_SIDE, SamplePattern};
 
@@ -105,6 +105,9 @@ impl SceneEntry {
         if !SamplePattern::is_count(self.captured_samples) {
             let count = self.captured_samples;
             return Err(out_of_range("captured_samples", count, "1, 2, 4, 8, 16, 32 or 64"));
+        }
+        if let Some(opacity) = &self.opacity {
+            Opacity::parse(opacity)?;
         }
         if let Some(rules) = &self.splat_rules {
             SplatRules::parse(rules)?;

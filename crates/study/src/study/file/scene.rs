@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::study::file::defaults;
 use screendoor_scene::capture::{
-    CameraChoice, CameraOptions, CaptureOptions, Chosen, Faces, Order, PatternKind, SplatRules,
+    CameraChoice, CameraOptions, CaptureOptions, Chosen, Faces, Opacity, Order, PatternKind,
+    SplatRules,
 };
 use screendoor_scene::scene::{self, Axes, LoadOptions, Scene};
 use screendoor_trace::error::Result;
@@ -32,6 +33,9 @@ pub struct SceneEntry {
     /// Opacity in place of the materials' own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub alpha: Option<f32>,
+    /// How opaque surfaces are by the angle at which they are seen: `NAME[:parameter=value,…]`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub opacity: Option<String>,
     /// A PNG or JPEG for surfaces that have no texture.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub texture: Option<String>,
@@ -127,7 +131,7 @@ impl SceneEntry {
     /// How it is captured, seen by the camera that was chosen for it.
     ///
     /// # Errors
-    /// As [`SplatRules::parse`].
+    /// As [`SplatRules::parse`] and [`Opacity::parse`].
     pub fn options(&self, chosen: Chosen) -> Result<CaptureOptions> {
         let splats = self.splat_rules.as_deref().map(SplatRules::parse);
         let [width, height] = chosen.size;
@@ -137,6 +141,7 @@ impl SceneEntry {
             samples: self.captured_samples,
             pattern: self.pattern,
             alpha: self.alpha,
+            opacity: self.opacity.as_deref().map(Opacity::parse).transpose()?.unwrap_or_default(),
             order: self.order,
             order_seed: self.order_seed,
             faces: self.faces,

@@ -122,15 +122,15 @@ mod tests {
                     + f64::from(plane.dzdy) * aside[1];
                 let slope = f64::from(plane.dzdx.unsigned_abs().max(plane.dzdy.unsigned_abs()));
                 compared += 1;
-                // A place in single precision, and a pixel's share of a slope.
-                let reach = 1e-4 * slope + 1e-6 * UNITS;
+                // Corners are moved to a grid of 1/256 pixel, in either view.
+                let reach = slope / 64.0 + 1e-6 * UNITS;
                 off += u32::from((f64::from(receiver.z.0) - wanted).abs() > reach);
-                steep +=
-                    u32::from((f64::from(receiver.slope) - slope).abs() > 0.01 * slope + reach);
+                let bent = (f64::from(receiver.slope) - slope).abs();
+                steep += u32::from(bent > 0.1 * slope + 1e-5 * UNITS);
             }
             assert!(compared > 500, "{compared}");
-            // Triangles cut by the frame's edges and the like.
-            assert!(off * 100 <= compared && steep * 100 <= compared, "{off} {steep} {compared}");
+            // Triangles of less than a pixel, which the grid bends.
+            assert!(off * 20 <= compared && steep * 50 <= compared, "{off} {steep} {compared}");
         }
     }
 

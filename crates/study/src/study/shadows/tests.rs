@@ -115,12 +115,13 @@ fn what_light_reaches_is_as_bright_as_it_was_and_the_rest_loses_its_direct_part(
 
 #[test]
 fn random_samples_are_right_on_average_and_rounds_and_taps_lessen_their_noise() {
-    let (light, camera) = (light(&LAYERS[..2]), camera(u32::MAX));
+    // No multiples of an eighth, of which masks would be exact.
+    let (light, camera) = (light(&[(1 << 30, 0.3), (2 << 30, 0.45)]), camera(u32::MAX));
     let error = |options: &ShadowOptions| shade(&camera, &light, options).1;
     let single = error(&options("lk"));
     // 256 pixels: a deviation of 0.1 a pixel at most; 6 σ.
     assert!(single.mean.abs() < 6.0 * 0.1 / 16.0 && single.rmse > 0.02, "{single:?}");
-    assert_eq!(single.truth, 0.25);
+    assert!((single.truth - 0.7 * 0.55).abs() < 1e-7, "{}", single.truth);
     let rounds = error(&ShadowOptions { rounds: 16, ..options("lk") });
     assert!(rounds.rmse < 0.5 * single.rmse, "{} {}", rounds.rmse, single.rmse);
     let filter = Filter { taps: 16, radius: 2.0, ..options("lk").filter };
@@ -134,7 +135,7 @@ fn random_samples_are_right_on_average_and_rounds_and_taps_lessen_their_noise() 
 
 #[test]
 fn errors_are_told_by_depth_and_of_what_was_asked_alone() {
-    let light = light(&[(1 << 31, 0.5)]);
+    let light = light(&[(1 << 31, 0.3)]);
     let mut all = fragments(&camera(1 << 28));
     let behind = fragments(&camera(u32::MAX));
     all.extend(behind.iter().take(10));
