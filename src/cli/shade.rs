@@ -134,8 +134,12 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         edit.print(console)?;
         let ShadowCost { state_bits, passes } = document.cost;
         let passes = if passes == 1 { "1 pass".into() } else { format!("{passes} passes") };
+        let state = match state_bits {
+            Some(bits) => format!("{bits} bits a pixel"),
+            None => "a state that grows with the fragments".into(),
+        };
         console.print(format_args!(
-            "light: {} at {samples} samples, {state_bits} bits a pixel, {passes}",
+            "light: {} at {samples} samples, {state}, {passes}",
             document.design
         ))?;
         let Some(error) = &document.error else { return Ok(()) };

@@ -49,8 +49,9 @@ pub struct ShadowOptions {
 /// What a light's map costs.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct ShadowCost {
-    /// Bits of state of a pixel of the map without its colours, of all rounds together.
-    pub state_bits: u32,
+    /// Bits of state of a pixel of the map without its colours, of all rounds together; `None` where
+    /// it grows with the fragments.
+    pub state_bits: Option<u32>,
     /// How many times the light's trace is read.
     pub passes: u32,
 }
@@ -123,7 +124,10 @@ impl<'a> Shade<'a> {
             false => None,
         };
         let cost = ShadowCost {
-            state_bits: maps.iter().map(|map| map.state_bits().total()).sum(),
+            state_bits: maps
+                .iter()
+                .map(|map| Some(map.state_bits()).filter(|b| !b.unbounded).map(|b| b.total()))
+                .sum(),
             passes: maps.iter().map(VisibilityMap::passes).sum(),
         };
         let mut header = old.clone();
