@@ -191,7 +191,7 @@ pub(super) fn run_shuffle(arguments: &ShuffleArguments, console: &Console) -> Re
 pub(super) struct Files {
     compression: Compression,
     file: OutputFile,
-    pub json: Option<Json>,
+    json: Option<Json>,
 }
 
 impl Target {

@@ -2,9 +2,7 @@
 
 use clap::Args;
 
-use crate::capture::{
-    LIGHTS, LightKind, OPACITY_MODELS, OpacityModel, RULE_SETS, RuleSet, SPLAT_PARAMS,
-};
+use crate::capture::{LIGHTS, Model, OPACITY_MODELS, RULE_SETS, RuleSet, SPLAT_PARAMS};
 use crate::cli::console::Console;
 use crate::cli::designs::print_params;
 use crate::cli::files::{JsonArgument, report};
@@ -51,10 +49,8 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         help: set.help,
         settings: set.settings.iter().copied().collect(),
     });
-    let document = |l: LightKind| Document { name: l.name, summary: l.help, params: l.params };
-    let lights: Vec<Document> = LIGHTS.map(document).into();
-    let document = |m: OpacityModel| Document { name: m.name, summary: m.help, params: m.params };
-    let models: Vec<Document> = OPACITY_MODELS.map(document).into();
+    let document = |m: Model| Document { name: m.name, summary: m.help, params: m.params };
+    let (lights, models) = (LIGHTS.map(document), OPACITY_MODELS.map(document));
     let list = List {
         scenes: &documents,
         splat_rules: &rules,
@@ -74,15 +70,12 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
             console.print(format_args!("  {name}: {help}{set}"))?;
         }
         print_params(&SPLAT_PARAMS, console)?;
-        console.print(format_args!("capture --light NAME"))?;
-        for LightKind { name, help, params } in LIGHTS {
-            console.print(format_args!("  {name}: {help}"))?;
-            print_params(params, console)?;
-        }
-        console.print(format_args!("capture --opacity NAME"))?;
-        for OpacityModel { name, help, params } in OPACITY_MODELS {
-            console.print(format_args!("  {name}: {help}"))?;
-            print_params(params, console)?;
+        for (option, models) in [("light", &LIGHTS[..]), ("opacity", &OPACITY_MODELS)] {
+            console.print(format_args!("capture --{option} NAME"))?;
+            for Model { name, help, params } in models {
+                console.print(format_args!("  {name}: {help}"))?;
+                print_params(params, console)?;
+            }
         }
         Ok(())
     })

@@ -99,9 +99,12 @@ pub(super) fn keeps_all(job: &Job<'_>, bins: &Bins) -> bool {
 pub(super) fn states(job: &Job<'_>, bins: &Bins) -> TileMap<TileState> {
     let told = Told::new(job);
     let draw = |block: &mut Block, (tile, rows): &(TileId, u64)| {
-        let state = drawn_state(job, bins, *tile, block);
+        let found = drawn_tile(job, bins, *tile, block, (&mut None, true));
         told.more(*rows);
-        Some((*tile, state?))
+        match found {
+            Found::State(state) => Some((*tile, state)),
+            Found::Nothing | Found::Picture(_) => None,
+        }
     };
     let drawn = bins.tiles().par_iter().map_init(Block::default, draw);
     let mut states = TileMap::new(job.frame.grid);
@@ -110,22 +113,6 @@ pub(super) fn states(job: &Job<'_>, bins: &Bins) -> TileMap<TileState> {
     }
     told.all();
     states
-}
-
-/// A tile's state after the last pass, where a fragment touches it.
-fn drawn_state(job: &Job<'_>, bins: &Bins, tile: TileId, block: &mut Block) -> Option<TileState> {
-    let Job { design, frame, .. } = job;
-    let mut state = None;
-    for pass in 0..design.passes() {
-        let mut blocks = TileBlocks::of(bins, tile, frame, block);
-        if !blocks.any() {
-            return None;
-        }
-        let state = state.get_or_insert_with(|| design.clear(frame.grid, tile));
-        design.draw_blocks(pass, state, &mut blocks, Listener::Nobody);
-        design.end_pass(pass, frame.grid, tile, state, Listener::Nobody);
-    }
-    state
 }
 
 /// How many of the tiles may be drawn at the same time: their states must fit into memory.
@@ -147,18 +134,45 @@ fn draw_tile(
     tile: TileId,
     block: &mut Block,
 ) -> (Option<TilePixels>, Option<EventCounts>) {
-    let Job { design, frame, .. } = job;
     let mut counts = job.options.count_events.then(EventCounts::default);
+    let Job { design, frame, .. } = job;
+    let pixels = match drawn_tile(job, bins, tile, block, (&mut counts, false)) {
+        Found::Nothing => None,
+        Found::Picture(pixels) => Some(pixels),
+        Found::State(state) => Some(design.resolve(frame.grid, tile, &state)),
+    };
+    (pixels, counts)
+}
+
+/// What is left of a tile after the last pass.
+enum Found {
+    /// No fragment touches it.
+    Nothing,
+    /// Its colours, which an engine found without a state.
+    Picture(TilePixels),
+    State(TileState),
+}
+
+/// Draws a tile in all passes and counts events where that is asked for. Where its state is to be
+/// kept, no engine may do without.
+fn drawn_tile(
+    job: &Job<'_>,
+    bins: &Bins,
+    tile: TileId,
+    block: &mut Block,
+    (counts, keep): (&mut Option<EventCounts>, bool),
+) -> Found {
+    let Job { design, frame, .. } = job;
     let mut state = None;
     for pass in 0..design.passes() {
         let mut blocks = TileBlocks::of(bins, tile, frame, block);
         if !blocks.any() {
-            return (None, counts);
+            return Found::Nothing;
         }
-        if pass == 0 {
+        if pass == 0 && !keep {
             let listener = counts.as_mut().map_or(Listener::Nobody, Listener::Counts);
             if let Some(pixels) = design.picture(frame.grid, tile, &mut blocks, listener) {
-                return (Some(pixels), counts);
+                return Found::Picture(pixels);
             }
         }
         let state = state.get_or_insert_with(|| design.clear(frame.grid, tile));
@@ -166,7 +180,7 @@ fn draw_tile(
         design.draw_blocks(pass, state, &mut blocks, listener.again());
         design.end_pass(pass, frame.grid, tile, state, listener);
     }
-    (state.map(|state| design.resolve(frame.grid, tile, &state)), counts)
+    state.map_or(Found::Nothing, Found::State)
 }
 
 /// Tells how far a replay has got, from any thread, now and then.

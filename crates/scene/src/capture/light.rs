@@ -4,10 +4,11 @@
 use glam::DVec3;
 
 use crate::capture::camera::{Camera, CameraOptions};
+use crate::capture::model::Model;
 use crate::capture::{Capture, CaptureOptions};
 use crate::scene::Scene;
 use screendoor_trace::error::{Error, Result};
-use screendoor_trace::param::{Param, Typed, Values, parse_spec};
+use screendoor_trace::param::Typed;
 use screendoor_trace::picture::Space;
 use screendoor_trace::trace::{ColumnId, ColumnSet};
 
@@ -24,25 +25,14 @@ const YAW: Typed<f64> = Typed::real(
 );
 const PITCH: Typed<f64> = Typed::real("pitch", "50", (-90.0, 90.0), "degrees above");
 
-/// A kind of light.
-#[derive(Clone, Copy, Debug)]
-pub struct LightKind {
-    /// Its name.
-    pub name: &'static str,
-    /// What it is.
-    pub help: &'static str,
-    /// Its parameters.
-    pub params: &'static [Param],
-}
-
 /// The lights that a capture may have, in place of its own key light or as that.
-pub const LIGHTS: [LightKind; 2] = [
-    LightKind {
+pub const LIGHTS: [Model; 2] = [
+    Model {
         name: "key",
         help: "the capture's own, from the camera's upper right: colours are as without",
         params: &[],
     },
-    LightKind {
+    Model {
         name: "directional",
         help: "in its place one of the same strength from there, along parallel lines",
         params: &[YAW.param, PITCH.param],
@@ -64,13 +54,9 @@ impl Light {
     /// # Errors
     /// [`Error::Config`] for an unknown light or parameter, naming the nearest.
     pub fn parse(spec: &str) -> Result<Self> {
-        let (name, given) = parse_spec(spec)?;
-        let Some(kind) = LIGHTS.iter().find(|kind| kind.name == name) else {
-            return Err(Error::unknown("light", name, LIGHTS.iter().map(|kind| kind.name)));
-        };
-        let values = Values::resolve(kind.name, kind.params, &given)?;
-        Ok(match kind.params {
-            [] => Light::Key,
+        let (place, values) = Model::read("light", &LIGHTS, spec)?;
+        Ok(match place {
+            0 => Light::Key,
             _ => Light::Directional([values.get(YAW), values.get(PITCH)]),
         })
     }

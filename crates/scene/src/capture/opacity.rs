@@ -1,40 +1,30 @@
 //! Opacity by the angle at which a surface is seen: silhouettes look more opaque than what faces
 //! the viewer.
 
+use crate::capture::model::Model;
 use screendoor_trace::error::{Error, Result};
-use screendoor_trace::param::{Param, Typed, Values, parse_spec};
+use screendoor_trace::param::{Typed, Values};
 
 const LEAST: Typed<f64> = Typed::real("min", "0.2", (0.0, 1.0), "α_min, a factor of alpha");
 const MOST: Typed<f64> = Typed::real("max", "0.9", (0.0, 1.0), "α_max, a factor of alpha");
 const POWER: Typed<f64> = Typed::real("power", "2", (0.01, 64.0), "the cosine's power p");
 
-/// A model of opacity.
-#[derive(Clone, Copy, Debug)]
-pub struct OpacityModel {
-    /// Its name.
-    pub name: &'static str,
-    /// What it does.
-    pub help: &'static str,
-    /// Its parameters.
-    pub params: &'static [Param],
-}
-
 /// The models of opacity that a capture may have, the one first that holds where none is asked
 /// for.
-pub const OPACITY_MODELS: [OpacityModel; 4] = [
-    OpacityModel { name: "constant", help: "alpha is what it is from every side", params: &[] },
-    OpacityModel {
+pub const OPACITY_MODELS: [Model; 4] = [
+    Model { name: "constant", help: "alpha is what it is from every side", params: &[] },
+    Model {
         name: "crow",
         help: "alpha times α_min + (α_max − α_min)·(1 − |N_z|)^p: most at silhouettes (Crow 1978)",
         params: &[LEAST.param, MOST.param, POWER.param],
     },
-    OpacityModel {
+    Model {
         name: "crow-printed",
         help: "alpha times (α_max − α_min)·(1 − (1 − |N_z|)^p) + α_min, the formula as printed: least \
                at silhouettes, since it is one of transparency",
         params: &[LEAST.param, MOST.param, POWER.param],
     },
-    OpacityModel {
+    Model {
         name: "thickness",
         help: "1 − (1 − alpha)^(1/|cos θ|): a sheet is as thick as a line of sight finds it (Kay, \
                Greenberg 1979)",
@@ -85,14 +75,8 @@ impl Opacity {
     /// [`Error::Config`] for an unknown model or parameter, naming the nearest, and for an α_min
     /// above α_max.
     pub fn parse(spec: &str) -> Result<Self> {
-        let (name, given) = parse_spec(spec)?;
-        let Some(model) = OPACITY_MODELS.iter().position(|model| model.name == name) else {
-            let names = OPACITY_MODELS.iter().map(|model| model.name);
-            return Err(Error::unknown("model of opacity", name, names));
-        };
-        let OpacityModel { name, params, .. } = OPACITY_MODELS[model];
-        let values = Values::resolve(name, params, &given)?;
-        let opacity = match model {
+        let (place, values) = Model::read("model of opacity", &OPACITY_MODELS, spec)?;
+        let opacity = match place {
             0 => Opacity::Constant,
             1 => Opacity::Crow(Cosine::of(&values)),
             2 => Opacity::Printed(Cosine::of(&values)),
@@ -100,7 +84,10 @@ impl Opacity {
         };
         match opacity {
             Opacity::Crow(c) | Opacity::Printed(c) if c.least > c.most => Err(Error::config(
-                format_args!("{name}: min is {} and max {}", c.least, c.most),
+                format_args!(
+                    "{}: min is {} and max {}",
+                    OPACITY_MODELS[place].name, c.least, c.most
+                ),
                 "give a min that is not above max",
             )),
             _ => Ok(opacity),

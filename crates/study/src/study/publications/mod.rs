@@ -34,8 +34,8 @@ use screendoor_scene::scene;
 use screendoor_trace::error::Result;
 use screendoor_trace::picture::Picture;
 use screendoor_trace::trace::{
-    ColourFormat, DepthPlane, Fragment, Header, SampleMask, Trace, TraceWriter, Unorm32,
-    WriteOptions,
+    ColourFormat, DepthPlane, Fragment, Header, SampleMask, SamplePattern, Trace, TraceWriter,
+    Unorm32, WriteOptions,
 };
 
 /// How much to spend.
@@ -137,26 +137,39 @@ fn whole_layers(
     background: [f32; 3],
     layers: &[([f32; 3], f32)],
 ) -> Result<Trace> {
+    let depths = (1..).map(|i: u32| Unorm32(i << 24));
+    let layers = depths.zip(layers).map(|(z, (colour, alpha))| (z, *colour, *alpha));
+    layers_at(side, pattern(PatternKind::Standard, samples)?, background, layers)
+}
+
+/// A trace of whole layers at these depths, with their colours and alphas, drawn in this order.
+fn layers_at(
+    side: u32,
+    pattern: SamplePattern,
+    background: [f32; 3],
+    layers: impl Iterator<Item = (Unorm32, [f32; 3], f32)>,
+) -> Result<Trace> {
+    let coverage = SampleMask::first(pattern.samples());
     let header = Header {
         width: side,
         height: side,
-        pattern: pattern(PatternKind::Standard, samples)?,
+        pattern,
         background,
         colour: ColourFormat::F32,
-        source: format!("{} whole layers", layers.len()),
+        source: "whole layers".to_string(),
         camera: "none".to_string(),
         ..Header::default()
     };
     let mut writer = TraceWriter::new(Vec::new(), "memory", header, WriteOptions::default())?;
-    for (i, (colour, alpha)) in layers.iter().enumerate() {
+    for (i, (z, colour, alpha)) in layers.enumerate() {
         for (x, y) in (0..side).flat_map(|y| (0..side).map(move |x| (x, y))) {
             writer.push(&Fragment {
                 x: x as u16,
                 y: y as u16,
-                coverage: SampleMask::first(samples),
-                depth: DepthPlane { z: Unorm32((i as u32 + 1) << 24), dzdx: 0, dzdy: 0 },
-                colour: *colour,
-                alpha: *alpha,
+                coverage,
+                depth: DepthPlane { z, dzdx: 0, dzdy: 0 },
+                colour,
+                alpha,
                 primitive: i as u32,
                 object: i as u32,
                 ..Fragment::default()

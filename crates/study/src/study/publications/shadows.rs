@@ -10,17 +10,14 @@ use serde::Serialize;
 
 use crate::metrics::{Convergence, Estimate};
 use crate::study::publications::experiment::Lab;
-use crate::study::publications::{Effort, MEMORY, capture};
+use crate::study::publications::{Effort, capture, layers_at, options};
 use screendoor_designs::{REFERENCE, configure};
+use screendoor_rop::Family;
 use screendoor_rop::visibility::{Filter, Receiver, VisibilityMap};
-use screendoor_rop::{Family, ReplayOptions};
-use screendoor_scene::capture::{CameraOptions, CaptureOptions};
+use screendoor_scene::capture::{CameraOptions, CaptureOptions, PatternKind, pattern};
 use screendoor_trace::error::Result;
 use screendoor_trace::random::{Stream, hash};
-use screendoor_trace::trace::{
-    ColourFormat, DepthPlane, Fragment, Header, SampleMask, SamplePattern, Trace, TraceWriter,
-    Unorm32, WriteOptions,
-};
+use screendoor_trace::trace::{Trace, Unorm32};
 
 /// What is measured of shadow maps.
 #[derive(Debug, Serialize)]
@@ -192,10 +189,6 @@ pub fn shadows(lab: &Lab<'_>, effort: Effort) -> Result<Shadows> {
     Ok(Shadows { effort, clouds, slopes, seeds, side, scenes })
 }
 
-fn options() -> ReplayOptions<'static> {
-    ReplayOptions { memory: MEMORY, ..ReplayOptions::default() }
-}
-
 fn map(design: &str, trace: &Trace, samples: u32, seed: u32) -> Result<VisibilityMap> {
     configure(design, &[])?.visibility_map(trace, samples, seed, &options())
 }
@@ -205,34 +198,10 @@ fn unorm(depth: f64) -> Unorm32 {
     Unorm32((depth * f64::from(u32::MAX)) as u32)
 }
 
-/// A trace of whole layers over a small frame.
+/// A trace of layers over a small frame.
 fn blockers(layers: &[(f64, f64)]) -> Result<Trace> {
-    let positions = (0..64).map(|s| [(s % 8 * 2 - 7) as i8, (s / 8 * 2 - 7) as i8]).collect();
-    let header = Header {
-        width: SIDE,
-        height: SIDE,
-        pattern: SamplePattern { name: "grid-64".to_string(), positions, nested: true },
-        colour: ColourFormat::F32,
-        source: format!("{} blockers", layers.len()),
-        camera: "none".to_string(),
-        ..Header::default()
-    };
-    let mut writer = TraceWriter::new(Vec::new(), "memory", header, WriteOptions::default())?;
-    for (i, (depth, alpha)) in layers.iter().enumerate() {
-        for (x, y) in (0..SIDE).flat_map(|y| (0..SIDE).map(move |x| (x, y))) {
-            writer.push(&Fragment {
-                x: x as u16,
-                y: y as u16,
-                coverage: SampleMask(u64::MAX),
-                depth: DepthPlane { z: unorm(*depth), dzdx: 0, dzdy: 0 },
-                alpha: *alpha as f32,
-                primitive: i as u32,
-                object: i as u32,
-                ..Fragment::default()
-            })?;
-        }
-    }
-    Trace::from_bytes(writer.finish()?.0, "memory")
+    let layers = layers.iter().map(|(depth, alpha)| (unorm(*depth), [0.0; 3], *alpha as f32));
+    layers_at(SIDE, pattern(PatternKind::Auto, 64)?, [0.0; 3], layers)
 }
 
 /// Depths and opacities drawn at random.
