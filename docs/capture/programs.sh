@@ -20,7 +20,7 @@ screendoor=${SCREENDOOR:-target/release/screendoor}
 [ -n "${SCREENDOOR:-}" ] || cargo build --locked --release --workspace
 export XDG_RUNTIME_DIR=${XDG_RUNTIME_DIR:-$(mktemp -d)}
 # Without a display there is one of our own.
-[ -n "${DISPLAY:-}" ] || exec xvfb-run --auto-servernum "$0"
+[ -n "${DISPLAY:-}" ] || exec xvfb-run --auto-servernum --server-args="-screen 0 1280x1024x24 -noreset" "$0"
 
 out=$(mktemp -d)
 here=docs/capture/programs

@@ -5,11 +5,13 @@
 pub mod chart;
 pub mod document;
 pub mod export;
+mod filters;
 mod folder;
 pub mod html;
 mod montage;
 mod results;
 mod stability;
+mod visibility;
 
 pub use folder::{About, PAGE, write_report};
 pub use results::{

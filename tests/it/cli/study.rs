@@ -578,3 +578,79 @@ fn what_of_a_scene_is_not_drawn_is_told_by_a_study_too() {
     run();
     assert_eq!(facts(), told);
 }
+
+const LIT: &str = "
+name = 'lit'
+designs = ['lk', 'exact']
+samples = [4]
+seeds = 1
+timing = 0
+metrics = []
+pictures = []
+[[scene]]
+name = 'engine'
+source = 'builtin:engine:rows=1,detail=2'
+size = [64, 64]
+light = 'directional:yaw=-50,pitch=40'
+[scene.shadow]
+design = ['enderton', 'merging:layers={n}']
+samples = [1, 4]
+pcf = [1, 4]
+size = [96, 80]
+";
+
+#[test]
+fn a_study_of_shadows_finds_what_shade_finds() {
+    let place = Workplace::new();
+    fs::write(place.path("s.toml"), LIT).unwrap();
+    place.good(&["study", "s.toml", "-o", "lit"]);
+    let facts = |scene: &str| -> Value {
+        let path = place.path("lit/scenes").join(format!("{scene}.json"));
+        serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
+    };
+    let scenes = fs::read_dir(place.path("lit/scenes")).unwrap().count();
+    let shared = fs::read_dir(place.path("lit/shadows")).unwrap().count();
+    assert_eq!((scenes, shared), (8, 2), "a camera's trace and a light's for all");
+
+    let light = ["--light", "directional:yaw=-50,pitch=40", "--light-trace", "l.arrow"];
+    let capture = ["capture", "builtin:engine:rows=1,detail=2", "-o", "c.arrow", "--size", "64x64"];
+    place.good(&[&capture[..], &light, &["--light-size", "96x80"]].concat());
+    let shade = ["shade", "c.arrow", "l.arrow", "-o", "s.arrow", "--design", "merging:layers=4"];
+    let more = ["--samples", "4", "--pcf", "4", "--json", "-"];
+    let shaded: Value = serde_json::from_str(&place.good(&[&shade[..], &more].concat())).unwrap();
+    let found = facts("engine-merging-layers-4-4-4");
+    assert_eq!(found["content"], shaded["content"]);
+    assert_eq!(found["shadow"]["error"], shaded["error"]);
+    assert_eq!(found["shadow"]["cost"], shaded["cost"]);
+    assert_eq!(found["shadow"]["design"], shaded["design"]);
+    assert_ne!(found["content"], facts("engine-enderton-1-1")["content"]);
+
+    let text = fs::read_to_string(place.path("lit/results.md")).unwrap();
+    let section = text.split("## Visibility").nth(1).expect("a section");
+    let rmse = format!("{:.4}", found["shadow"]["error"]["rmse"].as_f64().unwrap());
+    let row = section.lines().find(|l| l.contains("| engine-merging-layers-4-4-4 |")).unwrap();
+    assert!(row.contains(&rmse), "{row}");
+    let page = fs::read_to_string(place.path("lit/report.html")).unwrap();
+    assert!(page.contains("id=\"visibility-by-state\"") && page.contains(&rmse));
+
+    // Ended between the trace and what is known of it, and again without what was shared.
+    let whole = results(&place.path("lit"));
+    fs::remove_file(place.path("lit/scenes/engine-enderton-1-1.json")).unwrap();
+    fs::remove_dir_all(place.path("lit/shadows")).unwrap();
+    for entry in fs::read_dir(place.path("lit/runs")).unwrap() {
+        fs::remove_file(entry.unwrap().path()).unwrap();
+    }
+    place.good(&["study", "s.toml", "-o", "lit"]);
+    assert!(results(&place.path("lit")) == whole);
+}
+
+#[test]
+fn a_study_without_shadows_says_nothing_of_them() {
+    let place = with_study(&[]);
+    place.good(&["study", "s.toml", "-o", "plain"]);
+    let facts = fs::read_to_string(place.path("plain/scenes/glass.json")).unwrap();
+    let page = fs::read_to_string(place.path("plain/report.html")).unwrap();
+    let text = fs::read_to_string(place.path("plain/results.md")).unwrap();
+    assert!(!facts.contains("shadow") && !text.contains("## Visibility"));
+    assert!(!page.contains("visibility-by-state"));
+}

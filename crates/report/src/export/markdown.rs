@@ -2,6 +2,7 @@
 
 use crate::document::{Section, Text};
 use crate::html::words::{counted, figures, fixed};
+use crate::{filters, visibility};
 use screendoor_study::metrics::Estimate;
 use screendoor_study::study::record::Record;
 use screendoor_study::study::results::{Missing, Results};
@@ -28,6 +29,8 @@ pub fn markdown(results: &Results) -> String {
     for scene in &study.scenes {
         document.parts.extend(study.samples.iter().map(|n| table(results, &scene.name, *n)));
     }
+    document.parts.extend(visibility::section(results));
+    document.parts.extend(filters::section(results));
     let mut machine = Section::new("Machine");
     let facts = results.machine.facts();
     machine.table(["", ""], facts.iter().map(|(name, value)| [*name, value].map(Text::plain)));

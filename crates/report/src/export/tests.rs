@@ -13,7 +13,7 @@ use super::*;
 use screendoor_study::metrics::Estimate;
 use screendoor_study::study::analysis::made_up::plausible;
 use screendoor_study::study::file::{SceneEntry, Study};
-use screendoor_study::study::record::Record;
+use screendoor_study::study::record::{PostFiltered, Record};
 use screendoor_study::study::throughput::Spread;
 
 /// Records with a value in every column, and with what is awkward.
@@ -24,6 +24,14 @@ fn records() -> Vec<Record> {
         Estimate { low: f64::NEG_INFINITY, high: f64::INFINITY, ..Estimate::exactly(3.5) };
     records[2].fine = Estimate::exactly(0.1 + 0.2);
     records[2].blocks = Some(Estimate::exactly(0.25));
+    records[3].post = vec![PostFiltered {
+        filter: "alpha".into(),
+        rmse: Estimate::exactly(1.5),
+        interior: Estimate::exactly(1.25),
+        edges: Estimate::exactly(1.75),
+        flip: Some(Estimate::exactly(0.125)),
+        blur: 0.5,
+    }];
     records[3].events.hashes = u64::MAX;
     let gpu = records[3].speed.get_mut("gpu").unwrap();
     gpu.kernel = Some(Spread { low: 1e-9, median: 2e-7, high: 0.3 });
@@ -224,7 +232,9 @@ fn whole_scene(small: &SceneEntry) -> SceneEntry {
         line_width: Some(1.0),
         space: Some(Default::default()),
         background: Some([0.0; 3]),
+        light: Some(String::new()),
         pixel: Some([0; 2]),
+        shadow: Some(toml::from_str("design = 'lk'").unwrap()),
     }
 }
 
@@ -235,13 +245,18 @@ fn every_key_of_a_study_is_documented_with_its_default() {
     let given: toml::Table = toml::from_str(text).unwrap();
     let small: toml::Table = toml::from_str(&study.to_toml()).unwrap();
     let scene = |study: &toml::Table| study["scene"][0].as_table().unwrap().clone();
-    let defaults = [
-        ("Keys of a study", small.clone(), given.clone()),
-        ("Keys of a scene", scene(&small), scene(&given)),
-    ];
+    let shadow_given: toml::Table = toml::from_str("design = 'lk'").unwrap();
+    let (given_scene, small_scene) = (scene(&given), scene(&small));
     study.scenes[0] = whole_scene(&study.scenes[0]);
     let whole: toml::Table = toml::from_str(&study.to_toml()).unwrap();
-    for ((heading, small, given), whole) in defaults.iter().zip([&whole, &scene(&whole)]) {
+    // Of a shadow all keys are always written.
+    let shadow = scene(&whole)["shadow"].as_table().unwrap().clone();
+    let keys = [
+        ("Keys of a study", small, given, whole.clone()),
+        ("Keys of a scene", small_scene, given_scene, scene(&whole)),
+        ("Keys of a shadow", shadow.clone(), shadow_given, shadow),
+    ];
+    for (heading, small, given, whole) in keys {
         let table = documented(heading);
         let said: BTreeSet<&String> = table.iter().map(|row| &row[0]).collect();
         assert_eq!(said, whole.keys().collect(), "{heading}");
@@ -259,9 +274,17 @@ fn every_key_of_a_study_is_documented_with_its_default() {
 
 #[test]
 fn studies_that_are_shown_are_some() {
-    let example = DOCUMENT.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
-    let study = Study::parse(example, "STUDIES.md").unwrap();
+    let mut examples =
+        DOCUMENT.split("```toml\n").skip(1).map(|part| part.split("```").next().unwrap());
+    let study = Study::parse(examples.next().unwrap(), "STUDIES.md").unwrap();
     assert_eq!((study.scenes.len(), study.seeds), (2, 16));
+    let lit = examples.next().unwrap();
+    let lit = format!("name = 'a'\ndesigns = ['lk']\nsamples = [8]\n{lit}");
+    let lit = Study::parse(&lit, "STUDIES.md").unwrap();
+    assert_eq!(
+        (lit.scenes.len(), lit.scenes[11].name.as_str()),
+        (12, "hair-merging-layers-8-8-16")
+    );
     let small = include_str!("../../../../workflow/small.toml");
     let small = Study::parse(small, "small.toml").unwrap();
     assert!(small.scenes.iter().all(|s| s.size == Some([64, 64])));

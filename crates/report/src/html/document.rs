@@ -74,6 +74,12 @@ fn block(block: &Block, figure: &Figure<'_>) -> Markup {
     }
 }
 
+/// A table of such words.
+pub(super) fn rows<R: AsRef<[Text]>>(header: &[Text], rows: &[R]) -> Markup {
+    let rows = rows.iter().map(|row| row.as_ref().to_vec()).collect();
+    table(&Table { header: header.to_vec(), rows })
+}
+
 fn table(table: &Table) -> Markup {
     let class = |column| table.is_right(column).then_some("n");
     let columns: Vec<_> = table.header.iter().enumerate().map(|(i, t)| (i, t, class(i))).collect();

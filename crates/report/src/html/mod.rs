@@ -8,6 +8,7 @@ mod convergence;
 mod cost;
 mod document;
 mod error;
+mod filters;
 pub(crate) mod packed;
 mod page;
 mod parts;
@@ -17,6 +18,7 @@ mod reproduce;
 mod tests;
 pub(crate) mod verification;
 pub(crate) mod viewer;
+mod visibility;
 pub(crate) mod words;
 
 pub use choice::answer;

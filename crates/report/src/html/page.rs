@@ -4,7 +4,9 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use crate::html::parts::Content;
 use crate::html::words::counted;
-use crate::html::{about, choice, convergence, cost, error, perception, reproduce};
+use crate::html::{
+    about, choice, convergence, cost, error, filters, perception, reproduce, visibility,
+};
 use screendoor_study::study::results::Results;
 
 const CSS: &str = include_str!("report.css");
@@ -92,6 +94,10 @@ pub fn page(results: &Results, extras: &Extras) -> String {
     parts.push(own("error", "Error", error::section(&content)));
     parts.push(own("perception", "Perception", perception::section(&content)));
     parts.push(own("convergence", "Convergence", convergence::section(&content)));
+    parts.extend(
+        visibility::section(&content).map(|body| own("shadows", "Visibility in shadows", body)),
+    );
+    parts.extend(filters::section(&content).map(|body| own("post-filters", "Filters", body)));
     parts.push(own("cost", "Speed and cost", cost::section(&content)));
     parts.push(own("designs", "Designs", about::designs(&content)));
     let again =

@@ -11,7 +11,7 @@ use crate::html::page::{Place, Section};
 const SUMMARY: &str = "publications";
 
 /// The anchor of a section by its heading.
-fn anchor(heading: &str) -> String {
+pub(crate) fn anchor(heading: &str) -> String {
     let words: Vec<String> = heading
         .replace(['\'', '\u{2019}'], "")
         .split(|c: char| !c.is_alphanumeric())

@@ -12,6 +12,7 @@ mod figures;
 mod front;
 mod methods;
 mod noise;
+mod papers;
 mod pixel_orders;
 mod programs;
 mod ratios;
@@ -184,7 +185,7 @@ pub const PARTS: [Publication; 7] = [
 pub const FIGURES_FOLDER: &str = "figures";
 
 /// RESULTS.md: what was `measured`, and of the other parts what the document said
-/// `before`.
+/// `before`; at its end the papers line by line.
 pub fn results(before: &str, measured: &[(Publication, Chapter)]) -> String {
     let mut text = preamble().to_markdown(1, FIGURES_FOLDER);
     for part in PARTS {
@@ -200,6 +201,9 @@ pub fn results(before: &str, measured: &[(Publication, Chapter)]) -> String {
         if let Some(part) = new.or_else(old) {
             let _ = write!(text, "{start}{part}{end}");
         }
+    }
+    if let Some(papers) = papers::section(&text) {
+        text.push_str(&papers.to_markdown(2, FIGURES_FOLDER));
     }
     text
 }

@@ -20,7 +20,7 @@ impl Model {
     ///
     /// # Errors
     /// [`Error::Config`] for an unknown name or parameter, naming the nearest.
-    pub(super) fn read(kind: &str, models: &[Model], spec: &str) -> Result<(usize, Values)> {
+    pub fn read(kind: &str, models: &[Model], spec: &str) -> Result<(usize, Values)> {
         let (name, given) = parse_spec(spec)?;
         let Some(place) = models.iter().position(|model| model.name == name) else {
             return Err(Error::unknown(kind, name, models.iter().map(|model| model.name)));

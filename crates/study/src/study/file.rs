@@ -2,6 +2,7 @@
 
 mod check;
 mod scene;
+mod shadow;
 mod text;
 mod traces;
 
@@ -10,6 +11,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 pub use scene::SceneEntry;
+pub use shadow::{Several, ShadowEntry};
 
 use crate::study::engine::EngineName;
 use crate::study::file::text::{explained, read_text};
@@ -84,6 +86,10 @@ pub struct Study {
     /// Metrics beyond the errors.
     #[serde(default = "defaults::metrics")]
     pub metrics: Vec<Metric>,
+    /// Filters of the finished pictures, each of which is tried on every picture:
+    /// `NAME[:parameter=value,…]`.
+    #[serde(default)]
+    pub filters: Vec<String>,
     /// The design that others are held against; the first of `designs` where not given.
     #[serde(default)]
     pub baseline: String,
@@ -100,6 +106,16 @@ pub struct Study {
     /// The scenes.
     #[serde(rename = "scene")]
     pub scenes: Vec<SceneEntry>,
+}
+
+/// A design's name at a sample count.
+fn at(series: &str, samples: u32) -> String {
+    series.replace("{n}", &samples.to_string()).replace("{2n}", &(2 * samples).to_string())
+}
+
+/// The design of that name.
+fn design_at(series: &str, samples: u32) -> Result<Configured> {
+    configure(&at(series, samples), &[])
 }
 
 /// The default study.
@@ -154,7 +170,10 @@ impl Study {
         let mut study: Study = toml::from_str(text).map_err(|e| explained(&e, text, place))?;
         let given: toml::Table = toml::from_str(text).map_err(|e| explained(&e, text, place))?;
         study.adapt_defaults(&given);
-        study.check().map_err(|e| Error::config(format_args!("{place}: {e}"), "correct it"))?;
+        let wrong = |e: Error| Error::config(format_args!("{place}: {e}"), "correct it");
+        let scenes = std::mem::take(&mut study.scenes).into_iter().map(SceneEntry::swept);
+        study.scenes = scenes.collect::<Result<Vec<_>>>().map_err(wrong)?.concat();
+        study.check().map_err(wrong)?;
         Ok(study)
     }
 
@@ -185,9 +204,7 @@ impl Study {
     /// # Errors
     /// As [`configure`].
     pub fn design(&self, series: &str, samples: u32) -> Result<Configured> {
-        let spec =
-            series.replace("{n}", &samples.to_string()).replace("{2n}", &(2 * samples).to_string());
-        configure(&spec, &[])
+        design_at(series, samples)
     }
 
     /// The publications to measure: each once, and none that is part of another.

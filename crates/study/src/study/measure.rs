@@ -13,9 +13,12 @@ use rayon::prelude::*;
 use crate::metrics::{
     Ensemble, EnsembleErrors, Estimate, FlipFigures, Spectrum, filtered_rmse, rmse,
 };
+use crate::post::PostFilter;
 use crate::study::engine::{Engine, FAST, OnGpu};
 use crate::study::file::Metric;
-use crate::study::record::{Filtered, FlipOverSeeds, Record, SpectrumOverSeeds, VERSION};
+use crate::study::record::{
+    Filtered, FlipOverSeeds, PostFiltered, Record, SpectrumOverSeeds, VERSION,
+};
 pub use crate::study::subject::{BLOCK, Reference, Subject, averaged};
 use screendoor_designs::Configured;
 use screendoor_rop::{EventCounts, ReplayOptions, Replayed, StateBits};
@@ -149,6 +152,7 @@ pub fn measure(
         flip_hdr: flip(&seen, |s| s.flip_hdr),
         spectrum: spectrum(&seen),
         blocks: blocks.map(|squares| Estimate::of(&squares).sqrt()),
+        post: post(reference, &seen),
         events: counted.events,
         state_bits: counted.state_bits,
         layout: counted.layout,
@@ -198,6 +202,15 @@ struct Seen {
     flip_hdr: Option<FlipFigures>,
     spectrum: Option<Spectrum>,
     blocks_square: Option<f64>,
+    post: Vec<SeenFiltered>,
+}
+
+/// What is seen of a seed's picture after a filter.
+struct SeenFiltered {
+    square: f64,
+    interior_square: f64,
+    edges_square: f64,
+    flip: Option<f64>,
 }
 
 /// What came of looking at all seeds.
@@ -281,8 +294,47 @@ impl Run<'_> {
             spectrum: takes(Metric::Spectrum).then(|| Spectrum::of(picture, &reference.picture)),
             blocks_square: blocks
                 .map(|(exact, frame)| rmse(&averaged(picture, BLOCK), exact, frame).powi(2)),
+            post: self.filtered(picture),
         }
     }
+
+    /// What the reference's filters leave of a picture's error.
+    fn filtered(&self, picture: &Picture) -> Vec<SeenFiltered> {
+        let Reference { post, classes, picture: exact, flip, .. } = self.reference;
+        let Some(post) = post else { return Vec::new() };
+        let flip = flip.as_ref().filter(|_| self.setup.metrics.contains(&Metric::Flip));
+        let seen = |filter: &PostFilter| {
+            let filtered = filter.apply(picture, &post.guides);
+            let square = |region| rmse(&filtered, exact, region).powi(2);
+            SeenFiltered {
+                square: square(&classes.covered),
+                interior_square: square(&classes.interior),
+                edges_square: square(&classes.edges),
+                flip: flip.map(|flip| flip.ldr(&filtered).figures().mean),
+            }
+        };
+        post.filters.iter().map(|(_, filter, _)| seen(filter)).collect()
+    }
+}
+
+/// What the reference's filters leave, over all seeds.
+fn post(reference: &Reference, seen: &[Seen]) -> Vec<PostFiltered> {
+    let filters = reference.post.iter().flat_map(|post| &post.filters);
+    let each = |(i, (filter, _, blur)): (usize, &(String, PostFilter, f64))| {
+        let over = |of: &dyn Fn(&SeenFiltered) -> f64| {
+            Estimate::of(&seen.iter().map(|s| of(&s.post[i])).collect::<Vec<_>>())
+        };
+        let flip: Option<Vec<f64>> = seen.iter().map(|s| s.post[i].flip).collect();
+        PostFiltered {
+            filter: filter.clone(),
+            rmse: over(&|s| s.square).sqrt(),
+            interior: over(&|s| s.interior_square).sqrt(),
+            edges: over(&|s| s.edges_square).sqrt(),
+            flip: flip.map(|all| Estimate::of(&all)),
+            blur: *blur,
+        }
+    };
+    filters.enumerate().map(each).collect()
 }
 
 fn flip(seen: &[Seen], of: impl Fn(&Seen) -> Option<FlipFigures>) -> Option<FlipOverSeeds> {

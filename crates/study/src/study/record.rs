@@ -102,6 +102,9 @@ pub struct Record {
     /// [`BLOCK`](crate::study::measure::BLOCK) × `BLOCK` pixels, in 8-bit units.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub blocks: Option<Estimate>,
+    /// What filters of the finished pictures leave, in the study's order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub post: Vec<PostFiltered>,
     /// What the design did with the first seed.
     pub events: EventCounts,
     /// State per pixel.
@@ -193,6 +196,25 @@ pub struct Filtered {
     pub sigma: f64,
     /// What is left, in 8-bit units.
     pub rmse: Estimate,
+}
+
+/// Errors of the finished pictures after a filter, against the exact picture that is not filtered, in
+/// 8-bit units.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PostFiltered {
+    /// The filter as the study has it.
+    pub filter: String,
+    /// Over the covered pixels.
+    pub rmse: Estimate,
+    /// Over those that no primitive's edge crosses.
+    pub interior: Estimate,
+    /// Over the other covered pixels.
+    pub edges: Estimate,
+    /// Mean FLIP over the frame, where it is asked for.
+    pub flip: Option<Estimate>,
+    /// Of the exact picture itself after the filter: what it blurs.
+    pub blur: f64,
 }
 
 /// FLIP of several seeds: 0 (the same) to 1.

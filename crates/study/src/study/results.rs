@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::study::file::Study;
 use crate::study::record::Record;
+use crate::study::shadows::{ShadowCost, VisibilityError};
 use screendoor_trace::picture::Space;
 use screendoor_trace::trace::{Statistics, View};
 
@@ -54,6 +55,39 @@ pub struct SceneFacts {
     pub pixel: [u16; 2],
     /// It in numbers.
     pub statistics: Statistics,
+    /// What a design found of the shadows in it, where it has some.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shadow: Option<ShadowFacts>,
+}
+
+/// What a design that drew a light's view found of the light that reaches a camera's fragments.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ShadowFacts {
+    /// What the camera sees.
+    pub source: String,
+    /// BLAKE3 of the camera's trace before it was shaded.
+    pub camera: String,
+    /// BLAKE3 of the light's trace.
+    pub light: String,
+    /// Width and height of the light's map in pixels.
+    pub size: [u32; 2],
+    /// What drew it, as the study has it at all sample counts: `merging:layers={n}`.
+    pub series: String,
+    /// The same at this one.
+    pub design: String,
+    /// Its family.
+    pub family: String,
+    /// At how many samples a pixel.
+    pub samples: u32,
+    /// How many times, with a seed each.
+    pub rounds: u32,
+    /// With how many places a fragment was compared.
+    pub pcf: u32,
+    /// What the map costs.
+    pub cost: ShadowCost,
+    /// How far the visibilities are from the exact ones over the same places.
+    pub error: VisibilityError,
 }
 
 impl SceneFacts {

@@ -1,6 +1,7 @@
 //! What runs are measured on: a trace, and the exact picture at a sample count.
 
-use crate::metrics::{Encoded, Flip, PixelClasses, Region};
+use crate::metrics::{Encoded, Flip, PixelClasses, Region, rmse};
+use crate::post::{Guides, PostFilter};
 use crate::study::file::Metric;
 use crate::study::throughput::work;
 use screendoor_designs::{REFERENCE, configure};
@@ -85,6 +86,15 @@ pub struct Reference {
     pub(super) flip: Option<Flip>,
     /// The picture averaged over blocks, and its frame, where it is asked for.
     pub(super) blocks: Option<(Picture, Region)>,
+    /// Filters that are tried on every picture, and what guides them, where any are.
+    pub(super) post: Option<Post>,
+}
+
+/// Filters of finished pictures.
+pub(super) struct Post {
+    pub guides: Guides,
+    /// Each as the study has it, and what it does to the exact picture: RMSE over the covered pixels.
+    pub filters: Vec<(String, PostFilter, f64)>,
 }
 
 impl Reference {
@@ -119,8 +129,29 @@ impl Reference {
                 let frame = Region::frame(blocks.grid());
                 (blocks, frame)
             }),
+            post: None,
             picture,
         })
+    }
+
+    /// The same with filters that are tried on every picture.
+    ///
+    /// # Errors
+    /// As [`Guides::of`] and [`PostFilter::parse`].
+    pub fn filtered_by(mut self, subject: &Subject, filters: &[String]) -> Result<Self> {
+        if filters.is_empty() {
+            return Ok(self);
+        }
+        let guides = Guides::of(&subject.trace, self.samples, subject.memory)?;
+        let tried = |spec: &String| {
+            let filter = PostFilter::parse(spec)?;
+            let blurred = filter.apply(&self.picture, &guides);
+            let blur = rmse(&blurred, &self.picture, &self.classes.covered);
+            Ok((spec.clone(), filter, blur))
+        };
+        let filters = filters.iter().map(tried).collect::<Result<_>>()?;
+        self.post = Some(Post { guides, filters });
+        Ok(self)
     }
 }
 

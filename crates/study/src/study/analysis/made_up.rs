@@ -38,6 +38,7 @@ fn empty(scenes: &[&str], counts: &[u32], designs: &[&str]) -> Results {
         engines: vec![],
         timing: 3,
         metrics: vec![],
+        filters: vec![],
         baseline: designs[0].to_string(),
         publications: vec![],
         pictures: vec![],
@@ -103,6 +104,7 @@ fn facts(name: &str, place: usize) -> SceneFacts {
         warnings: Vec::new(),
         pixel: [256, 256],
         statistics,
+        shadow: None,
     }
 }
 
@@ -151,6 +153,7 @@ pub fn record(scene: &str, series: &str, samples: u32, rmse: Estimate) -> Record
         fine: rmse.scaled(1.3),
         filtered: vec![],
         blocks: None,
+        post: vec![],
         flip: None,
         flip_hdr: None,
         spectrum: None,

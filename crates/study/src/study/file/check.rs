@@ -2,8 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::study::file::{SceneEntry, Study};
-use screendoor_scene::capture::{Opacity, SplatRules, pattern};
+use crate::post::PostFilter;
+use crate::study::file::{SceneEntry, ShadowEntry, Study};
+use screendoor_scene::capture::{Light, Opacity, SplatRules, pattern};
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::trace::{MAX_SIDE, SamplePattern};
 
@@ -45,6 +46,8 @@ impl Study {
             let what = format_args!("pictures are kept of {count} samples, which are not measured");
             return Err(Error::config(what, "add the count to 'samples', or change 'pictures'"));
         }
+        unique("filter", &self.filters)?;
+        self.filters.iter().try_for_each(|filter| PostFilter::parse(filter).map(|_| ()))?;
         if !self.designs.contains(&self.baseline) {
             let designs = self.designs.iter().map(String::as_str);
             return Err(Error::unknown("design as a baseline:", &self.baseline, designs));
@@ -109,6 +112,7 @@ impl SceneEntry {
         if let Some(opacity) = &self.opacity {
             Opacity::parse(opacity)?;
         }
+        self.check_light()?;
         if let Some(rules) = &self.splat_rules {
             SplatRules::parse(rules)?;
         }
@@ -131,8 +135,9 @@ impl SceneEntry {
         }
         if self.trace.is_none() {
             let recorded = pattern(self.pattern, self.captured_samples)?;
-            let lacks = |count: &&u32| recorded.prefix(**count).is_err();
-            if let Some(count) = samples.iter().find(lacks) {
+            let lacks = |count: &u32| recorded.prefix(*count).is_err();
+            let of_light = self.shadow.iter().map(ShadowEntry::samples);
+            if let Some(count) = samples.iter().copied().chain(of_light).find(lacks) {
                 return Err(Error::config(
                     format_args!(
                         "scene '{name}' is captured with {} samples, which do not serve {count}",
@@ -143,6 +148,26 @@ impl SceneEntry {
             }
         }
         Ok(())
+    }
+
+    fn check_light(&self) -> Result<()> {
+        let name = &self.name;
+        let refused = |what: &str, hint: &str| {
+            Err(Error::config(format_args!("scene '{name}' has {what}"), hint))
+        };
+        if let Some(light) = &self.light {
+            Light::parse(light)?;
+            if self.trace.is_some() {
+                return refused("a trace, and a light beside it", "'screendoor shade' it before");
+            }
+        }
+        let Some(shadow) = &self.shadow else { return Ok(()) };
+        if self.light.is_none() {
+            return refused("a shadow and no light", "add light = 'key', say");
+        }
+        shadow.check().map_err(|e| {
+            Error::config(format_args!("the shadow of scene '{name}': {e}"), "correct it")
+        })
     }
 }
 

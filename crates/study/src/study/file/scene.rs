@@ -4,9 +4,9 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use crate::study::file::defaults;
+use crate::study::file::{ShadowEntry, defaults};
 use screendoor_scene::capture::{
-    CameraChoice, CameraOptions, CaptureOptions, Chosen, Faces, Opacity, Order, PatternKind,
+    CameraChoice, CameraOptions, CaptureOptions, Chosen, Faces, Light, Opacity, Order, PatternKind,
     SplatRules,
 };
 use screendoor_scene::scene::{self, Axes, LoadOptions, Scene};
@@ -89,10 +89,16 @@ pub struct SceneEntry {
     /// Linear colour behind the scene.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub background: Option<[f32; 3]>,
+    /// The light of which it is recorded what of colours comes from it: `NAME[:parameter=value,…]`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub light: Option<String>,
     /// The pixel that the report's inspector opens at; one with a handful of fragments
     /// where not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pixel: Option<[u16; 2]>,
+    /// The shadows of that light; without them it shines through everything.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shadow: Option<ShadowEntry>,
 }
 
 impl SceneEntry {
@@ -131,7 +137,7 @@ impl SceneEntry {
     /// How it is captured, seen by the camera that was chosen for it.
     ///
     /// # Errors
-    /// As [`SplatRules::parse`] and [`Opacity::parse`].
+    /// As [`SplatRules::parse`], [`Opacity::parse`] and [`Light::parse`].
     pub fn options(&self, chosen: Chosen) -> Result<CaptureOptions> {
         let splats = self.splat_rules.as_deref().map(SplatRules::parse);
         let [width, height] = chosen.size;
@@ -154,6 +160,7 @@ impl SceneEntry {
             },
             splats: splats.transpose()?.unwrap_or_default(),
             space: self.space,
+            light: self.light.as_deref().map(Light::parse).transpose()?,
             ..CaptureOptions::default()
         })
     }

@@ -123,3 +123,61 @@ fn a_study_of_traces_has_what_they_serve() {
     assert!(twice.unwrap_err().to_string().contains("two of the traces are called ramps"));
     assert!(Study::of_traces(&[place("none.arrow")]).is_err());
 }
+
+/// A study of one scene whose light's shadows have these keys.
+fn with_shadow(keys: &str) -> String {
+    format!("{SMALL}light = 'key'\n[scene.shadow]\n{keys}\n")
+}
+
+#[test]
+fn of_shadows_with_several_values_each_combination_is_a_scene() {
+    let text = with_shadow("design = ['lk', 'mlab:layers={n}']\nsamples = [1, 4]\npcf = [1, 9]");
+    let study = Study::parse(&text, "a.toml").unwrap();
+    let names: Vec<&str> = study.scenes.iter().map(|s| s.name.as_str()).collect();
+    assert_eq!(names.len(), 8);
+    assert_eq!(
+        [names[0], names[1], names[2], names[7]],
+        ["engine-lk-1-1", "engine-lk-1-9", "engine-lk-4-1", "engine-mlab-layers-4-4-9"]
+    );
+    let last = study.scenes[7].shadow.as_ref().unwrap().options().unwrap();
+    assert_eq!((last.design.label().as_str(), last.samples), ("mlab:layers=4", 4));
+    assert_eq!((last.filter.taps, last.filter.radius, last.rounds), (9, 1.5, 1));
+    assert_eq!(Study::parse(&study.to_toml(), "b.toml").unwrap(), study);
+    // One value of each is no sweep.
+    let one = Study::parse(&with_shadow("design = 'lk'\nsamples = [4]"), "a.toml").unwrap();
+    assert_eq!((one.scenes.len(), one.scenes[0].name.as_str()), (1, "engine"));
+    let count = one.scenes[0].shadow.as_ref().unwrap().samples();
+    assert_eq!((count, one.scenes[0].light.as_deref()), (4, Some("key")));
+}
+
+#[test]
+fn shadows_that_cannot_be_are_refused() {
+    for (keys, says) in [
+        ("design = 'blend'", "does not tell how much light"),
+        ("design = ['lk', 'blend']", "does not tell how much light"),
+        ("design = 'lkk'", "did you mean 'lk'?"),
+        ("design = []", "'design' of scene 'engine' is empty"),
+        ("design = 'lk'\nsamples = 3", "cannot have 3 samples"),
+        ("design = 'lk'\nsamples = 'many'", "neither a value of this key nor a list"),
+        ("design = 'lk'\npcf = [1, 5]", "do not lie on a square grid"),
+        ("design = 'lk'\nrounds = 65", "cannot be drawn 65 times"),
+        ("design = 'lk'\nsize = [0, 4]", "cannot be 0 pixels wide"),
+        ("design = 'lk'\nbias = -1.0", "the bias of a filter cannot be -1"),
+        ("design = 'lk'\ntap = 4", "did you mean 'taps'?"),
+        ("samples = 8", "design"),
+    ] {
+        let wrong = Study::parse(&with_shadow(keys), "a.toml").unwrap_err().to_string();
+        assert!(wrong.contains(says), "{keys}: {wrong}");
+    }
+    let refused = |change: (&str, &str)| {
+        let text = with_shadow("design = 'lk'").replace(change.0, change.1);
+        Study::parse(&text, "a.toml").unwrap_err().to_string()
+    };
+    let wrong = refused(("light = 'key'\n", ""));
+    assert!(wrong.contains("scene 'engine' has a shadow and no light"), "{wrong}");
+    assert!(refused(("'key'", "'lamp'")).contains("unknown light 'lamp'"));
+    let wrong = refused(("source = 'builtin:engine'", "trace = 'a.arrow'"));
+    assert!(wrong.contains("a trace, and a light beside it"), "{wrong}");
+    let wrong = refused(("light =", "captured_samples = 4\nlight ="));
+    assert!(wrong.contains("captured with 4 samples, which do not serve 8"), "{wrong}");
+}

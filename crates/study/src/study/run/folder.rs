@@ -8,7 +8,8 @@ use screendoor_trace::error::{Error, Result};
 use screendoor_trace::output::{OutputFile, is_partial};
 
 /// The folders in a study's folder.
-const FOLDERS: [&str; 6] = ["scenes", "traces", "runs", "pictures", "explain", "verification"];
+const FOLDERS: [&str; 7] =
+    ["scenes", "traces", "shadows", "runs", "pictures", "explain", "verification"];
 /// The study file in it.
 pub(super) const STUDY: &str = "study.toml";
 const LOCK: &str = ".lock";
@@ -146,8 +147,15 @@ fn holds_results(folder: &Path) -> bool {
 /// Removes from a study's folder what belongs to a study of which nothing was measured: scenes
 /// that were drawn, and why runs failed.
 fn clear(folder: &Path) {
-    let own = [("scenes", "json"), ("traces", "arrow"), ("runs", "failed"), ("explain", "json")];
-    for (name, ending) in own.into_iter().chain([("pictures", "exr")]) {
+    let own = [
+        ("scenes", "json"),
+        ("traces", "arrow"),
+        ("shadows", "arrow"),
+        ("runs", "failed"),
+        ("explain", "json"),
+        ("pictures", "exr"),
+    ];
+    for (name, ending) in own {
         for entry in fs::read_dir(folder.join(name)).into_iter().flatten().flatten() {
             if entry.path().extension().is_some_and(|found| found == ending) {
                 // What stays is refused where it is of another scene.

@@ -8,6 +8,7 @@ mod json;
 mod measure;
 mod merge;
 mod scene;
+mod shadow;
 mod store;
 mod tasks;
 
@@ -266,6 +267,7 @@ impl Open {
             None => {
                 watch(&format!("exact at {} on {}", job.samples, scene.facts.name));
                 Reference::of(&scene.subject, job.samples, &store.study().metrics)?
+                    .filtered_by(&scene.subject, &store.study().filters)?
             }
         };
         Ok((scene, self.reference.insert(reference)))

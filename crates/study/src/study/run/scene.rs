@@ -4,16 +4,16 @@ use std::path::Path;
 
 use crate::study::file::SceneEntry;
 use crate::study::measure::Subject;
-use crate::study::results::SceneFacts;
+use crate::study::results::{SceneFacts, ShadowFacts};
 use crate::study::run::json::put_sealed;
+use crate::study::run::shadow::{put_trace, shaded};
 use crate::study::run::store::Store;
 use screendoor_designs::REFERENCE;
 use screendoor_scene::capture::{Capture, CaptureOptions};
 use screendoor_scene::scene::Scene;
 use screendoor_trace::error::{Error, Result};
-use screendoor_trace::output::OutputFile;
 use screendoor_trace::tile::{TILE_PIXELS, TileGrid, TileMap};
-use screendoor_trace::trace::{Trace, TraceWriter, WriteOptions, statistics_within};
+use screendoor_trace::trace::{Trace, statistics_within};
 
 /// What runs are told of.
 pub(super) type Watch<'a> = &'a (dyn Fn(&str) + Sync);
@@ -36,27 +36,27 @@ impl OpenScene {
     pub(super) fn open(store: &Store, index: usize, base: &Path, watch: Watch<'_>) -> Result<Self> {
         let entry = &store.study().scenes[index];
         let own = store.folder().join(store.trace_name(index));
-        let mut warnings = None;
+        let mut drawn = None;
         let (path, shown) = match &entry.trace {
             Some(trace) => (base.join(trace), base.join(trace).display().to_string()),
             None => {
-                if !own.exists() {
+                // What was found of its shadows stands in its facts alone.
+                if !own.exists() || entry.shadow.is_some() && store.facts(index)?.is_none() {
                     watch(&format!("capturing {}", entry.name));
-                    warnings = Some(draw(entry, base, &own)?);
+                    drawn = Some(draw(store, entry, base, &own)?);
                 }
                 (own, store.trace_name(index))
             }
         };
         let trace = Trace::open(&path)?;
-        let warnings = || match warnings {
-            Some(warnings) => Ok(warnings),
+        let drawn = || match drawn {
+            Some(drawn) => Ok(drawn),
             // Drawn by a process that ended before it could say so.
-            None if entry.source.is_some() => {
-                prepared(entry, base).map(|(scene, _)| scene.warnings)
-            }
-            None => Ok(Vec::new()),
+            None if entry.source.is_some() => prepared(entry, base)
+                .map(|(scene, _)| Drawn { warnings: scene.warnings, shadow: None }),
+            None => Ok(Drawn::default()),
         };
-        let facts = facts(store, index, &trace, shown, warnings, watch)?;
+        let facts = facts(store, index, &trace, shown, drawn, watch)?;
         let all = trace.header().pattern.samples();
         watch(&format!("{REFERENCE} at {all} on {}", entry.name));
         let known = (facts.content.clone(), facts.statistics.tied_fragments);
@@ -82,22 +82,30 @@ fn prepared(entry: &SceneEntry, base: &Path) -> Result<(Scene, CaptureOptions)> 
     Ok((scene, options))
 }
 
-/// Draws a scene into the trace at `path`. Returns what of it is not drawn.
-fn draw(entry: &SceneEntry, base: &Path, path: &Path) -> Result<Vec<String>> {
+/// What became known of a scene when it was drawn.
+#[derive(Default)]
+struct Drawn {
+    /// What of it is not drawn.
+    warnings: Vec<String>,
+    shadow: Option<ShadowFacts>,
+}
+
+/// Draws a scene into the trace at `path`.
+fn draw(store: &Store, entry: &SceneEntry, base: &Path, path: &Path) -> Result<Drawn> {
     let (mut scene, options) = prepared(entry, base)?;
     let capture = Capture::new(&scene, &options)?;
-    let file = OutputFile::create(path)?;
-    let place = path.display().to_string();
-    let mut writer =
-        TraceWriter::new(file, &place, capture.header().clone(), WriteOptions::default())?;
-    capture.draw(&mut writer, |_, _| ())?;
-    let (file, written) = writer.finish()?;
-    file.commit()?;
+    let (rows, shadow) = match &entry.shadow {
+        None => (put_trace(path, capture.header(), |w| capture.draw(w, |_, _| ()))?, None),
+        Some(shadow) => {
+            let (rows, facts) = shaded(store, entry, shadow, (&scene, &capture), path)?;
+            (rows, Some(facts))
+        }
+    };
     drop(capture);
-    if written.rows == 0 {
+    if rows == 0 {
         scene.warnings.push(format!("{}: its trace has no fragments", entry.name));
     }
-    Ok(scene.warnings)
+    Ok(Drawn { warnings: scene.warnings, shadow })
 }
 
 /// The facts of a scene, written where they are not there yet.
@@ -106,7 +114,7 @@ fn facts(
     index: usize,
     trace: &Trace,
     shown: String,
-    warnings: impl FnOnce() -> Result<Vec<String>>,
+    drawn: impl FnOnce() -> Result<Drawn>,
     watch: Watch<'_>,
 ) -> Result<SceneFacts> {
     let entry = &store.study().scenes[index];
@@ -127,6 +135,7 @@ fn facts(
     }
     watch(&format!("counting {}", entry.name));
     let header = trace.header();
+    let Drawn { warnings, shadow } = drawn()?;
     let facts = SceneFacts {
         name: entry.name.clone(),
         trace: shown,
@@ -137,12 +146,13 @@ fn facts(
         camera: header.camera.clone(),
         view,
         space: header.space,
-        warnings: warnings()?,
+        warnings,
         pixel: match entry.pixel {
             Some(pixel) => pixel,
             None => telling_pixel(trace)?,
         },
         statistics: statistics_within(trace, store.study().memory << 20, |_, _| ())?,
+        shadow,
     };
     put_sealed(&store.scene_file(index), &facts)?;
     Ok(facts)

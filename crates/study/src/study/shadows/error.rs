@@ -1,6 +1,6 @@
 //! How far visibilities are from the exact ones.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::study::shadows::Query;
 
@@ -8,7 +8,8 @@ use crate::study::shadows::Query;
 const PARTS: usize = 8;
 
 /// Errors of visibility (0 to 1) over all fragments that asked.
-#[derive(Clone, PartialEq, Debug, Serialize)]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct VisibilityError {
     /// How many asked.
     pub queries: u64,
@@ -25,7 +26,8 @@ pub struct VisibilityError {
 }
 
 /// Errors of visibility in a part of the light's depth range.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct DepthError {
     /// Where it begins, as a share of the range.
     pub from: f64,

@@ -13,7 +13,7 @@ mod tests;
 use std::sync::Mutex;
 
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 pub use error::{DepthError, VisibilityError};
 
@@ -46,8 +46,26 @@ pub struct ShadowOptions {
     pub measure: bool,
 }
 
+impl ShadowOptions {
+    /// Checks that a light's trace can be drawn and looked up so.
+    ///
+    /// # Errors
+    /// [`Error::Config`] for a filter or a number of rounds that there is not.
+    pub fn check(&self) -> Result<()> {
+        self.filter.check()?;
+        if !(1..=64).contains(&self.rounds) {
+            return Err(Error::config(
+                format_args!("a light's trace cannot be drawn {} times", self.rounds),
+                "draw it 1 to 64 times",
+            ));
+        }
+        Ok(())
+    }
+}
+
 /// What a light's map costs.
-#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct ShadowCost {
     /// Bits of state of a pixel of the map without its colours, of all rounds together; `None` where
     /// it grows with the fragments.
@@ -87,13 +105,7 @@ impl<'a> Shade<'a> {
         replay: &ReplayOptions<'_>,
     ) -> Result<Self> {
         let ShadowOptions { design, samples, filter, .. } = options;
-        filter.check()?;
-        if !(1..=64).contains(&options.rounds) {
-            return Err(Error::config(
-                format_args!("a light's trace cannot be drawn {} times", options.rounds),
-                "draw it 1 to 64 times",
-            ));
-        }
+        options.check()?;
         let old = camera.header();
         let lacks = |id: &&ColumnId| !old.has(**id);
         if let Some(lacking) = DIRECT.iter().find(lacks) {
