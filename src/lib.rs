@@ -45,7 +45,7 @@ pub use screendoor_report as report;
 pub use screendoor_rop as rop;
 pub use screendoor_rop::resolve;
 pub use screendoor_scene::{capture, scene};
-pub use screendoor_study::{metrics, study};
+pub use screendoor_study::{metrics, post, study};
 pub use screendoor_trace::{edit, error, options, output, param, picture, random, tile, trace};
 pub use screendoor_vulkan as vulkan;
 

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::capture::{
     CameraChoice, CameraOptions, Capture, CaptureOptions, Faces, Light, Opacity, Order,
-    PatternKind, SplatRules, Unseen,
+    PatternKind, ScreenDoor, SplatRules, Unseen,
 };
 use crate::cli::arguments::{self, Change, Each, colour, numbers, option, samples, size};
 use crate::cli::console::{Console, grouped, table};
@@ -129,6 +129,10 @@ struct SceneArguments {
     /// ('screendoor scenes' lists them)
     #[arg(long, value_name = "MODEL", default_value = "constant")]
     opacity: String,
+    /// Cut what lets light through into opaque points or holes: NAME[:parameter=value,…]
+    /// ('screendoor scenes' lists them)
+    #[arg(long, value_name = "MODEL")]
+    screen_door: Option<String>,
     /// A picture (PNG, JPEG, WebP, BMP, TGA) for surfaces that have no texture
     #[arg(long, value_name = "FILE")]
     texture: Option<PathBuf>,
@@ -264,6 +268,7 @@ fn run_scene(
     }
     let opacity = Opacity::parse(&arguments.opacity)?;
     let light = arguments.light.as_deref().map(Light::parse).transpose()?;
+    let screen_door = arguments.screen_door.as_deref().map(ScreenDoor::parse).transpose()?;
     let of_file = choice.file().map(|_| choice.choose(&[])).transpose()?;
     let gpu = arguments.gpu.then(|| Gpu::open(arguments.adapter.as_deref())).transpose()?;
     let inputs: Vec<&Path> =
@@ -324,6 +329,7 @@ fn run_scene(
         splats,
         space: common.space,
         light,
+        screen_door,
     };
     scene.warnings.extend(options.unused(&scene));
     let write = WriteOptions { compression: common.compress, ..WriteOptions::default() };

@@ -10,13 +10,14 @@ use crate::cli::arguments::{MemoryArgument, RunArguments, engine_name, seeds};
 use crate::cli::console::{Console, grouped, shown};
 use crate::cli::files::{JsonArgument, check, report, write_pictures};
 use crate::design::{Configured, REFERENCE, configure};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::metrics::{Ensemble, EnsembleErrors, PixelClasses, Region};
 use crate::param::{Options, Values};
 use crate::picture::{Picture, PictureFile, Space};
+use crate::post::{Guides, PostFilter};
 use crate::rop::{EventCounts, Layout, Promises, ReplayOptions, Replayed, StateBits};
 use crate::study::engine::{EngineName, OnGpu};
-use crate::study::measure::replays;
+use crate::study::measure::{averaged, replays};
 use crate::trace::Trace;
 
 /// Replay a trace through a design: a picture, its error, what the ROP did
@@ -34,6 +35,14 @@ pub(super) struct Arguments {
     /// Composite the exact picture too and give the error against it
     #[arg(long)]
     exact: bool,
+    /// Filter the picture against noise before it is written and held against the exact one:
+    /// NAME[:parameter=value,…] (gaussian, bilateral, alpha, depth; docs/STUDIES.md, filters)
+    #[arg(long, value_name = "FILTER")]
+    filter: Option<String>,
+    /// Average the pictures that are written over blocks of K × K pixels; errors are of the pictures
+    /// before
+    #[arg(long, value_name = "K", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(2..=64))]
+    supersample: Option<u32>,
     /// A picture to write, .exr or .png; can be given several times
     #[arg(long, short, value_name = "FILE")]
     output: Vec<PathBuf>,
@@ -68,6 +77,8 @@ struct Document<'a> {
     gpu: &'a Option<OnGpu>,
     /// Of the first seed's picture: equal hashes are equal pictures.
     picture: String,
+    /// What it was filtered by.
+    filter: Option<&'a str>,
     seconds: f64,
     fragments_per_second: f64,
     passes: u32,
@@ -95,8 +106,17 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     check(&[arguments.run.path()], &outputs)?;
     let (design, trace, samples) = arguments.run.open(console)?;
     let engine = arguments.engine.open(arguments.adapter.as_deref())?;
+    let filter = arguments.filter.as_deref().map(PostFilter::parse).transpose()?;
     let header = trace.header();
-    let create = |path| PictureFile::create(path, header.width, header.height);
+    let side = arguments.supersample.unwrap_or(1);
+    let [width, height] = [header.width, header.height];
+    if width % side != 0 || height % side != 0 {
+        return Err(Error::config(
+            format_args!("{width}x{height} pixels do not fall into blocks of {side}x{side}"),
+            "capture a frame whose sides are multiples of --supersample",
+        ));
+    }
+    let create = |path| PictureFile::create(path, width / side, height / side);
     let mut files = arguments.output.iter().map(create).collect::<Result<Vec<_>>>()?;
     let json = arguments.json.open()?;
     let seed = arguments.run.seed;
@@ -112,8 +132,15 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     };
 
     let start = Instant::now();
-    let (first, gpu) = engine.replay(&design, &trace, samples, seed, &options)?;
+    let (mut first, gpu) = engine.replay(&design, &trace, samples, seed, &options)?;
     let seconds = start.elapsed().as_secs_f64();
+    let guided = |filter| Ok((filter, Guides::of(&trace, samples, options.memory)?));
+    let filter: Option<(PostFilter, Guides)> = filter.map(guided).transpose()?;
+    let finished = |picture: Picture| match &filter {
+        Some((filter, guides)) => filter.apply(&picture, guides),
+        None => picture,
+    };
+    first.picture = finished(first.picture);
 
     let reference = if arguments.exact || arguments.seeds > 1 {
         progress.name("compositing");
@@ -130,7 +157,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
                 progress.name(&format!("seed {place} of {}", arguments.seeds));
             });
             let replayed = replays(&engine, &design, &trace, samples, others, plain);
-            let pictures = replayed.map(|seed| Ok(seed?.replayed.picture));
+            let pictures = replayed.map(|seed| Ok(finished(seed?.replayed.picture)));
             Some(by_region(&trace, samples, reference, &first.picture, pictures)?)
         }
     };
@@ -144,7 +171,12 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     }
 
     // No file appears unless all could be written.
-    let saved = write_pictures(&mut files, &first.picture, reference.as_ref(), console)
+    let written = |picture: &Picture| match side {
+        1 => picture.clone(),
+        side => averaged(picture, side),
+    };
+    let (picture, exact) = (written(&first.picture), reference.as_ref().map(written));
+    let saved = write_pictures(&mut files, &picture, exact.as_ref(), console)
         .and_then(|()| files.into_iter().try_for_each(PictureFile::commit));
     let counted = first.events.as_ref().map_or(0, |events| events.fragments);
     let fragments = gpu.as_ref().map_or(counted, |gpu| gpu.fragments);
@@ -159,6 +191,7 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
         engine: arguments.engine,
         gpu: &gpu,
         picture: first.picture.hash(),
+        filter: arguments.filter.as_deref(),
         seconds,
         fragments,
         fragments_per_second: fragments as f64 / seconds,

@@ -2,7 +2,9 @@
 
 use clap::Args;
 
-use crate::capture::{LIGHTS, Model, OPACITY_MODELS, RULE_SETS, RuleSet, SPLAT_PARAMS};
+use crate::capture::{
+    LIGHTS, Model, OPACITY_MODELS, RULE_SETS, RuleSet, SCREEN_DOORS, SPLAT_PARAMS,
+};
 use crate::cli::console::Console;
 use crate::cli::designs::print_params;
 use crate::cli::files::{JsonArgument, report};
@@ -10,7 +12,7 @@ use crate::error::Result;
 use crate::param::Param;
 use crate::scene::builtin::{BUILTINS, Builtin};
 
-/// List the built-in scenes and their parameters, the rules by which splats are drawn, lights and models of opacity
+/// List the built-in scenes and their parameters, the rules by which splats are drawn, lights, models of opacity and screen doors
 #[derive(Debug, Args)]
 pub(super) struct Arguments {
     #[command(flatten)]
@@ -24,6 +26,7 @@ struct List<'a> {
     splat_parameters: &'a [Param],
     lights: &'a [Document],
     opacity_models: &'a [Document],
+    screen_doors: &'a [Document],
 }
 
 #[derive(serde::Serialize)]
@@ -51,12 +54,14 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
     });
     let document = |m: Model| Document { name: m.name, summary: m.help, params: m.params };
     let (lights, models) = (LIGHTS.map(document), OPACITY_MODELS.map(document));
+    let doors = SCREEN_DOORS.map(document);
     let list = List {
         scenes: &documents,
         splat_rules: &rules,
         splat_parameters: &SPLAT_PARAMS,
         lights: &lights,
         opacity_models: &models,
+        screen_doors: &doors,
     };
     report(json, "screendoor.scenes", &list, console, || {
         for scene in BUILTINS {
@@ -70,7 +75,9 @@ pub(super) fn run(arguments: &Arguments, console: &Console) -> Result<()> {
             console.print(format_args!("  {name}: {help}{set}"))?;
         }
         print_params(&SPLAT_PARAMS, console)?;
-        for (option, models) in [("light", &LIGHTS[..]), ("opacity", &OPACITY_MODELS)] {
+        let options =
+            [("light", &LIGHTS[..]), ("opacity", &OPACITY_MODELS), ("screen-door", &SCREEN_DOORS)];
+        for (option, models) in options {
             console.print(format_args!("capture --{option} NAME"))?;
             for Model { name, help, params } in models {
                 console.print(format_args!("  {name}: {help}"))?;

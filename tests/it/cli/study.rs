@@ -654,3 +654,42 @@ fn a_study_without_shadows_says_nothing_of_them() {
     assert!(!facts.contains("shadow") && !text.contains("## Visibility"));
     assert!(!page.contains("visibility-by-state"));
 }
+
+#[test]
+fn filters_are_measured_as_replay_applies_them() {
+    let place = with_study(&[
+        ("metrics = [", "filters = ['alpha', 'gaussian:sigma=2']\nmetrics = ["),
+        ("'kbuffer:layers={n}', ", ""),
+    ]);
+    place.good(&["study", "s.toml", "-o", "whole"]);
+    let text = fs::read_to_string(place.path("whole/results.jsonl")).unwrap();
+    let records: Vec<Record> = text.lines().map(|l| serde_json::from_str(l).unwrap()).collect();
+    assert!(records.iter().all(|r| r.post.len() == 2 && r.post[0].flip.is_some()));
+    let is = |r: &&Record| (&*r.scene, &*r.series, r.samples) == ("glass", "enderton", 8);
+    let record = records.iter().find(is).unwrap();
+    let replay = |filter: &[&str]| -> Value {
+        let run = ["replay", "whole/traces/glass.arrow", "--design", "enderton", "--samples", "8"];
+        let more = ["--seeds", "3", "--json", "-"];
+        serde_json::from_str(&place.good(&[&run[..], &more, filter].concat())).unwrap()
+    };
+    let plain = replay(&[]);
+    assert_eq!(plain["filter"], Value::Null);
+    for post in &record.post {
+        let found = replay(&["--filter", &post.filter]);
+        let rmse = found["errors"]["covered"]["rmse"]["value"].as_f64().unwrap();
+        assert!((rmse / post.covered.value - 1.0).abs() < 1e-9, "{rmse} {post:?}");
+        assert_eq!(found["filter"], post.filter.as_str());
+        assert_ne!(found["picture"], plain["picture"]);
+        assert!(post.blur > 0.0 && rmse != record.covered.rmse.value);
+    }
+    let report = fs::read_to_string(place.path("whole/report.html")).unwrap();
+    let table = fs::read_to_string(place.path("whole/results.md")).unwrap();
+    assert!(report.contains("id=\"filters-table\"") && table.contains("## Filters"));
+    assert!(table.contains("| `lk` | `gaussian:sigma=2` |"), "{table}");
+    let (_, error) = place.bad(&["replay", "whole/traces/glass.arrow", "--filter", "median"]);
+    assert!(error.contains("unknown filter 'median'"), "{error}");
+    fs::write(place.path("s.toml"), STUDY.replace("metrics", "filters = ['alpa']\nmetrics"))
+        .unwrap();
+    let (_, error) = place.bad(&["study", "s.toml", "-o", "none"]);
+    assert!(error.contains("did you mean 'alpha'?"), "{error}");
+}

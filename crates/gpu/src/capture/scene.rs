@@ -55,6 +55,12 @@ impl<'a> GpuCapture<'a> {
                 "leave --pattern out, or capture without --gpu",
             ));
         }
+        if let Some(door) = options.screen_door {
+            return Err(Error::config(
+                format_args!("a GPU's rasteriser does not cut the screen door '{}'", door.spec()),
+                "capture without --gpu, or without the screen door",
+            ));
+        }
         let mut capture = Capture::new(scene, options)?;
         capture.drawn_by(&gpu.adapter().name, sample_positions(gpu)?);
         Ok(GpuCapture { gpu, capture, options, capacity: CAPACITY })

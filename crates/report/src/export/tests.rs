@@ -26,7 +26,7 @@ fn records() -> Vec<Record> {
     records[2].blocks = Some(Estimate::exactly(0.25));
     records[3].post = vec![PostFiltered {
         filter: "alpha".into(),
-        rmse: Estimate::exactly(1.5),
+        covered: Estimate::exactly(1.5),
         interior: Estimate::exactly(1.25),
         edges: Estimate::exactly(1.75),
         flip: Some(Estimate::exactly(0.125)),
@@ -228,6 +228,7 @@ fn whole_scene(small: &SceneEntry) -> SceneEntry {
         camera_name: Some(String::new()),
         splat_rules: Some(String::new()),
         opacity: Some(String::new()),
+        screen_door: Some(String::new()),
         axes: Some(Default::default()),
         line_width: Some(1.0),
         space: Some(Default::default()),

@@ -48,14 +48,13 @@ fn chart(content: &Content<'_>, scene: &str, filter: &str) -> Markup {
         let found = record.and_then(|r| Some((r, r.post.iter().find(|p| p.filter == filter)?)));
         let bars = found.map(|(r, post)| {
             let blur = Estimate::exactly(post.blur);
-            [("without", r.covered.rmse, "a"), ("with", post.rmse, "b"), ("blur", blur, "c")].map(
-                |(what, e, class)| Bar::Dot {
+            [("without", r.covered.rmse, "a"), ("with", post.covered, "b"), ("blur", blur, "c")]
+                .map(|(what, e, class)| Bar::Dot {
                     value: [e.value, e.low, e.high],
                     measure: format!("filter-{what}"),
                     class,
                     says: format!("{}\n{what}: {}", r.design, estimated(e)),
-                },
-            )
+                })
         });
         Row {
             id: record.map_or(String::new(), |r| r.id.clone()),

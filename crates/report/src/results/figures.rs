@@ -81,6 +81,21 @@ pub const FIGURES: &[Figure] = &[
                   samples, without and with the sort.",
     },
     Figure {
+        file: "screen-doors",
+        panels: &[
+            "screen-door-exact",
+            "screen-door-stipple",
+            "screen-door-mask",
+            "screen-door-points",
+        ],
+        columns: 4,
+        enlarge: 2,
+        part: None,
+        caption: "Balls of alpha 0.5 blended exactly, and by the screen doors `stipple`, `mask` and \
+                  `points`, averaged over 16 by 16 pixels. One stipple for all hides what is behind; \
+                  points make silhouettes more opaque.",
+    },
+    Figure {
         file: "figure-9",
         panels: &["figure-9-enderton", "figure-9-lk"],
         columns: 2,

@@ -16,6 +16,7 @@ mod papers;
 mod pixel_orders;
 mod programs;
 mod ratios;
+mod screen_door;
 mod shadows;
 mod slab;
 mod splats;
@@ -33,6 +34,7 @@ use crate::stability;
 use screendoor_study::metrics::Estimate;
 use screendoor_study::study::file::Publication;
 use screendoor_study::study::publications::methods::Methods;
+use screendoor_study::study::publications::screen_door::ScreenDoors;
 use screendoor_study::study::publications::shadows::Shadows;
 use screendoor_study::study::publications::{Publications, Reproduced};
 use screendoor_trace::error::Result;
@@ -135,6 +137,10 @@ pub fn chapter(measured: &Reproduced) -> Chapter {
             views = shadows::view_charts(s);
             SHADOWS.iter().filter_map(|section| section(s)).collect()
         }
+        Reproduced::ScreenDoor(s) => {
+            figures = figures::of(&s.pictures);
+            SCREEN_DOOR.iter().filter_map(|section| section(s)).collect()
+        }
         Reproduced::Stability(s) => stability::sections(s),
     };
     let figures = figures.into_iter().map(|(name, drawn)| (name.to_string(), drawn));
@@ -170,11 +176,15 @@ const METHODS: [Of<Methods>; 8] = [
 
 const SHADOWS: [Of<Shadows>; 3] = [shadows::figure_3, shadows::figure_5, shadows::designs];
 
+const SCREEN_DOOR: [Of<ScreenDoors>; 3] =
+    [screen_door::by_angle, screen_door::layers, screen_door::distances];
+
 /// The parts of RESULTS.md, each of which can be measured on its own.
-pub const PARTS: [Publication; 7] = [
+pub const PARTS: [Publication; 8] = [
     Publication::LaineKarras,
     Publication::Methods,
     Publication::Shadows,
+    Publication::ScreenDoor,
     Publication::Comparison,
     Publication::Beyond,
     Publication::Splats,

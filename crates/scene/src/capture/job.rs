@@ -7,6 +7,7 @@ use crate::capture::geometry::{Splat, Triangle};
 use crate::capture::raster::{Bounds, Raster};
 use crate::capture::samples::{MOST, Samples};
 use crate::capture::scan::{Changes, Scan};
+use crate::capture::screen_door::Door;
 use crate::capture::setup::{Pieces, ScreenTriangle};
 use crate::capture::shade::Shader;
 use crate::capture::splat::{Nothing, OnFrame, Painter, Placed, SplatRules};
@@ -33,6 +34,8 @@ pub(super) struct Tools<'a> {
     pub(super) pixels: Vec<[f64; 2]>,
     /// The frame's, in pixels.
     pub(super) size: [u32; 2],
+    /// What cuts holes into that which lets light through.
+    pub(super) door: Option<Door>,
 }
 
 impl Tools<'_> {
@@ -100,6 +103,7 @@ impl Drawn {
         match self {
             Drawn::Triangle { triangle, pieces } => {
                 let raster = tools.raster(pieces.get(part.piece));
+                let from = fragments.len();
                 let scan = Scan::new(simd, &raster, &mut room.changes);
                 let mut batch = Batch::new(&raster, triangle, &tools.shader, &mut room.hits);
                 for y in part.rows.0..=part.rows.1 {
@@ -111,6 +115,12 @@ impl Drawn {
                     );
                 }
                 batch.finish(simd, fragments);
+                if let Some(door) = &tools.door {
+                    door.cut(triangle, &raster, tools.shader.camera, (fragments, from));
+                    if door.place_of_points(pieces, tools) == Some((part.piece, part.rows.0)) {
+                        door.add_points(triangle, tools, fragments);
+                    }
+                }
             }
             Drawn::Splat { on_frame, object, primitive } => {
                 let Ok(splat) = on_frame else { return };

@@ -26,6 +26,7 @@ mod plain;
 mod raster;
 mod samples;
 mod scan;
+mod screen_door;
 mod setup;
 mod shade;
 mod splat;
@@ -44,12 +45,14 @@ pub use model::Model;
 pub use opacity::{Cosine, OPACITY_MODELS, Opacity};
 pub use order::Order;
 pub use pattern::{PatternKind, pattern};
+pub use screen_door::{SCREEN_DOORS, ScreenDoor};
 pub use splat::{OnFrame as SplatOnFrame, PARAMS as SPLAT_PARAMS, RULE_SETS, RuleSet, SplatRules};
 pub use unseen::Unseen;
 
 use crate::capture::geometry::{Geometry, Primitive, Triangle};
 use crate::capture::job::{Drawn, Tools, cut_into_jobs, wave_length};
 use crate::capture::samples::Samples;
+use crate::capture::screen_door::Door;
 use crate::capture::setup::{Pieces, set_up};
 use crate::capture::shade::Shader;
 use crate::capture::splat::Painter;
@@ -104,6 +107,8 @@ pub struct CaptureOptions {
     pub space: Option<Space>,
     /// The light of which it is recorded what of each colour comes from it; none where not given.
     pub light: Option<Light>,
+    /// What cuts holes into that which lets light through; nothing where not given.
+    pub screen_door: Option<ScreenDoor>,
 }
 
 impl Default for CaptureOptions {
@@ -124,6 +129,7 @@ impl Default for CaptureOptions {
             splats: SplatRules::default(),
             space: None,
             light: None,
+            screen_door: None,
         }
     }
 }
@@ -211,6 +217,10 @@ impl<'a> Capture<'a> {
             light.check(scene, space)?;
             header.optional.extend(DIRECT);
             header.source.push_str(&format!(", light {}", light.spec()));
+        }
+        if let Some(door) = options.screen_door {
+            Door::new(door, scene).check(scene, &camera)?;
+            header.source.push_str(&format!(", screen door {}", door.spec()));
         }
         let shader = Shader::new(scene, &camera, options, space);
         if let Some(alpha) = shader.constant_alpha() {
@@ -369,6 +379,7 @@ impl<'a> Capture<'a> {
             samples: Samples::new(positions),
             pixels: positions.iter().map(|p| p.map(|v| f64::from(v) / 16.0)).collect(),
             size: [self.options.width, self.options.height],
+            door: self.options.screen_door.map(|door| Door::new(door, self.scene)),
         }
     }
 }

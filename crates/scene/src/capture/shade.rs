@@ -56,6 +56,8 @@ pub(crate) struct Shader<'a> {
     pub(super) alpha: Option<f32>,
     /// How it changes with the angle.
     pub(super) opacity: Opacity,
+    /// Whether a screen door leaves nothing that lets light through.
+    cut: bool,
     /// What the trace's colours stand for.
     pub(super) space: Space,
 }
@@ -73,7 +75,8 @@ impl<'a> Shader<'a> {
         let key = turned(camera, KEY);
         let key = light.map_or(key, |light| light.towards(key)).as_vec3();
         let fill = turned(camera, FILL).as_vec3();
-        Shader { scene, camera, key, fill, apart: light.is_some(), alpha, opacity, space }
+        let (apart, cut) = (light.is_some(), options.screen_door.is_some());
+        Shader { scene, camera, key, fill, apart, alpha, opacity, cut, space }
     }
 
     /// Material `index`.
@@ -83,6 +86,9 @@ impl<'a> Shader<'a> {
 
     /// The one alpha that every fragment of the scene has, if there is one.
     pub(super) fn constant_alpha(&self) -> Option<f32> {
+        if self.cut {
+            return Some(1.0);
+        }
         if self.opacity.varies() {
             return None;
         }

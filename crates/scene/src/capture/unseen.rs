@@ -152,6 +152,9 @@ impl Capture<'_> {
         if let AlphaMode::Mask { cutoff } = alpha_mode {
             return format!("all alphas of its material '{name}' are below the cutoff {cutoff}");
         }
+        if let Some(door) = self.options.screen_door {
+            return format!("the screen door {} has left nothing of it", door.spec());
+        }
         match self.options.alpha {
             Some(alpha) if alpha < LEAST_ALPHA => "the alpha asked for is 0".to_string(),
             None if *alpha_mode == AlphaMode::Blend && base.w < LEAST_ALPHA => {

@@ -327,7 +327,7 @@ fn post(reference: &Reference, seen: &[Seen]) -> Vec<PostFiltered> {
         let flip: Option<Vec<f64>> = seen.iter().map(|s| s.post[i].flip).collect();
         PostFiltered {
             filter: filter.clone(),
-            rmse: over(&|s| s.square).sqrt(),
+            covered: over(&|s| s.square).sqrt(),
             interior: over(&|s| s.interior_square).sqrt(),
             edges: over(&|s| s.edges_square).sqrt(),
             flip: flip.map(|all| Estimate::of(&all)),

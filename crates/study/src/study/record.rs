@@ -92,6 +92,9 @@ pub struct Record {
     /// left of it from afar. Empty where it was not asked for.
     #[serde(default)]
     pub filtered: Vec<Filtered>,
+    /// What filters of the finished pictures leave, in the study's order.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub post: Vec<PostFiltered>,
     /// FLIP of the pictures as a display of standard range shows them.
     pub flip: Option<FlipOverSeeds>,
     /// FLIP over all exposures in which something shows.
@@ -102,9 +105,6 @@ pub struct Record {
     /// [`BLOCK`](crate::study::measure::BLOCK) × `BLOCK` pixels, in 8-bit units.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub blocks: Option<Estimate>,
-    /// What filters of the finished pictures leave, in the study's order.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub post: Vec<PostFiltered>,
     /// What the design did with the first seed.
     pub events: EventCounts,
     /// State per pixel.
@@ -206,7 +206,7 @@ pub struct PostFiltered {
     /// The filter as the study has it.
     pub filter: String,
     /// Over the covered pixels.
-    pub rmse: Estimate,
+    pub covered: Estimate,
     /// Over those that no primitive's edge crosses.
     pub interior: Estimate,
     /// Over the other covered pixels.

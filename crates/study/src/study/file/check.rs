@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::post::PostFilter;
 use crate::study::file::{SceneEntry, ShadowEntry, Study};
-use screendoor_scene::capture::{Light, Opacity, SplatRules, pattern};
+use screendoor_scene::capture::{Light, Opacity, ScreenDoor, SplatRules, pattern};
 use screendoor_trace::error::{Error, Result};
 use screendoor_trace::trace::{MAX_SIDE, SamplePattern};
 
@@ -111,6 +111,9 @@ impl SceneEntry {
         }
         if let Some(opacity) = &self.opacity {
             Opacity::parse(opacity)?;
+        }
+        if let Some(door) = &self.screen_door {
+            ScreenDoor::parse(door)?;
         }
         self.check_light()?;
         if let Some(rules) = &self.splat_rules {

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::study::file::{ShadowEntry, defaults};
 use screendoor_scene::capture::{
     CameraChoice, CameraOptions, CaptureOptions, Chosen, Faces, Light, Opacity, Order, PatternKind,
-    SplatRules,
+    ScreenDoor, SplatRules,
 };
 use screendoor_scene::scene::{self, Axes, LoadOptions, Scene};
 use screendoor_trace::error::Result;
@@ -36,6 +36,10 @@ pub struct SceneEntry {
     /// How opaque surfaces are by the angle at which they are seen: `NAME[:parameter=value,…]`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub opacity: Option<String>,
+    /// What cuts that which lets light through into opaque points or holes:
+    /// `NAME[:parameter=value,…]`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub screen_door: Option<String>,
     /// A PNG or JPEG for surfaces that have no texture.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub texture: Option<String>,
@@ -137,7 +141,7 @@ impl SceneEntry {
     /// How it is captured, seen by the camera that was chosen for it.
     ///
     /// # Errors
-    /// As [`SplatRules::parse`], [`Opacity::parse`] and [`Light::parse`].
+    /// As [`SplatRules::parse`], [`Opacity::parse`], [`ScreenDoor::parse`] and [`Light::parse`].
     pub fn options(&self, chosen: Chosen) -> Result<CaptureOptions> {
         let splats = self.splat_rules.as_deref().map(SplatRules::parse);
         let [width, height] = chosen.size;
@@ -161,6 +165,7 @@ impl SceneEntry {
             splats: splats.transpose()?.unwrap_or_default(),
             space: self.space,
             light: self.light.as_deref().map(Light::parse).transpose()?,
+            screen_door: self.screen_door.as_deref().map(ScreenDoor::parse).transpose()?,
             ..CaptureOptions::default()
         })
     }

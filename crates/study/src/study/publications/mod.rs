@@ -11,6 +11,7 @@ mod noise;
 pub mod programs;
 mod reproduced;
 mod sampling;
+pub mod screen_door;
 pub mod shadows;
 pub mod splats;
 mod table_1;

@@ -6,6 +6,7 @@ use crate::study::publications::beyond::{Beyond, beyond};
 use crate::study::publications::experiment::Lab;
 use crate::study::publications::methods::{Methods, methods};
 use crate::study::publications::programs::programs;
+use crate::study::publications::screen_door::{ScreenDoors, screen_doors};
 use crate::study::publications::shadows::{Shadows, shadows};
 use crate::study::publications::splats::splats;
 use crate::study::publications::{Effort, Publications, reproduce};
@@ -32,6 +33,8 @@ pub enum Reproduced {
     Programs(Box<Results>),
     /// [`Publication::Shadows`].
     Shadows(Box<Shadows>),
+    /// [`Publication::ScreenDoor`].
+    ScreenDoor(Box<ScreenDoors>),
     /// [`Publication::Stability`].
     Stability(Box<Stability>),
 }
@@ -48,6 +51,7 @@ impl Reproduced {
             Reproduced::Splats(_) => Publication::Splats,
             Reproduced::Programs(_) => Publication::Programs,
             Reproduced::Shadows(_) => Publication::Shadows,
+            Reproduced::ScreenDoor(_) => Publication::ScreenDoor,
             Reproduced::Stability(_) => Publication::Stability,
         }
     }
@@ -59,6 +63,7 @@ impl Reproduced {
             Reproduced::Methods(_)
             | Reproduced::Programs(_)
             | Reproduced::Shadows(_)
+            | Reproduced::ScreenDoor(_)
             | Reproduced::Stability(_) => &[],
             Reproduced::Slab(c) | Reproduced::Comparison(c) => &c.missing,
             Reproduced::Beyond(b) | Reproduced::Splats(b) => &b.missing,
@@ -84,6 +89,10 @@ pub fn measure_publication(
         Publication::Splats => Reproduced::Splats(Box::new(splats(lab, effort)?)),
         Publication::Programs => Reproduced::Programs(Box::new(programs(lab)?)),
         Publication::Shadows => Reproduced::Shadows(Box::new(shadows(lab, effort)?)),
+        Publication::ScreenDoor => {
+            (lab.watch)("screen doors", 0, 1);
+            Reproduced::ScreenDoor(Box::new(screen_doors()?))
+        }
         Publication::Stability => {
             Reproduced::Stability(Box::new(stress_designs(16, |what, done, total| {
                 (lab.watch)(what, done, total);
