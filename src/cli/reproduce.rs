@@ -77,15 +77,15 @@ struct Part<'a> {
 }
 
 /// Minutes on two processors that the parts take with the default effort, roughly: the tables
-/// (their share grows with the pixels and the seeds), the expectations (with theirs), shadow maps, screen doors, the
+/// (their share grows with the pixels and the seeds), the expectations (with theirs), shadow maps, screen doors, costs, the
 /// comparison of all designs, this project's own over many seeds, splats, and what programs drew.
-const MINUTES: [f64; 8] = [15.0, 7.0, 0.2, 0.8, 25.0, 12.0, 3.0, 1.0];
+const MINUTES: [f64; 9] = [15.0, 7.0, 0.2, 0.8, 2.0, 25.0, 12.0, 3.0, 1.0];
 
 /// How long it takes on so many threads, roughly, in minutes.
 fn minutes(effort: Effort, part: Option<Publication>, threads: usize) -> f64 {
     let square = |side: u32, usual: f64| (f64::from(side) / usual).powi(2);
     let seeds = f64::from(effort.seeds) / 4.0;
-    let [tables, means, shadows, doors, comparison, beyond, splats, programs] = MINUTES;
+    let [tables, means, shadows, doors, costs, comparison, beyond, splats, programs] = MINUTES;
     let of = |own: Publication| part.is_none_or(|only| only == own);
     let mut minutes = 0.0;
     if of(Publication::LaineKarras) {
@@ -99,6 +99,9 @@ fn minutes(effort: Effort, part: Option<Publication>, threads: usize) -> f64 {
     }
     if of(Publication::ScreenDoor) {
         minutes += doors;
+    }
+    if of(Publication::Costs) {
+        minutes += costs * square(effort.comparison_side, 96.0);
     }
     if of(Publication::Comparison) {
         minutes += comparison * square(effort.comparison_side, 128.0) * seeds;

@@ -5,6 +5,7 @@ mod account;
 mod beyond;
 mod claims;
 mod comparison;
+mod costs;
 mod dial;
 mod examples;
 mod expectations;
@@ -33,6 +34,7 @@ use crate::document::{Against, Section, Text};
 use crate::stability;
 use screendoor_study::metrics::Estimate;
 use screendoor_study::study::file::Publication;
+use screendoor_study::study::publications::costs::Costs;
 use screendoor_study::study::publications::methods::Methods;
 use screendoor_study::study::publications::screen_door::ScreenDoors;
 use screendoor_study::study::publications::shadows::Shadows;
@@ -141,6 +143,7 @@ pub fn chapter(measured: &Reproduced) -> Chapter {
             figures = figures::of(&s.pictures);
             SCREEN_DOOR.iter().filter_map(|section| section(s)).collect()
         }
+        Reproduced::Costs(c) => COSTS.iter().filter_map(|section| section(c)).collect(),
         Reproduced::Stability(s) => stability::sections(s),
     };
     let figures = figures.into_iter().map(|(name, drawn)| (name.to_string(), drawn));
@@ -179,12 +182,15 @@ const SHADOWS: [Of<Shadows>; 3] = [shadows::figure_3, shadows::figure_5, shadows
 const SCREEN_DOOR: [Of<ScreenDoors>; 3] =
     [screen_door::by_angle, screen_door::layers, screen_door::distances];
 
+const COSTS: [Of<Costs>; 4] = [costs::multiples, costs::peeling, costs::views, costs::wyman];
+
 /// The parts of RESULTS.md, each of which can be measured on its own.
-pub const PARTS: [Publication; 8] = [
+pub const PARTS: [Publication; 9] = [
     Publication::LaineKarras,
     Publication::Methods,
     Publication::Shadows,
     Publication::ScreenDoor,
+    Publication::Costs,
     Publication::Comparison,
     Publication::Beyond,
     Publication::Splats,

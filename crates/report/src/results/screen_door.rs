@@ -55,11 +55,11 @@ fn by_angle_against(s: &ScreenDoors) -> Against {
              surface faces the viewer: an even grid that does not lie on the pixels leaves some without a point. \
              Masks keep it on large triangles alone: of a square in {triangles} triangles, which all begin at the \
              same texel, {cut:.3} is opaque in place of {whole:.3}.",
-            triangles = 2 * PARTS[PARTS.len() - 1].pow(2),
             holds(statements[0]),
             holds(statements[1]),
             holds(statements[2]),
-            holds(statements[3])
+            holds(statements[3]),
+            triangles = 2 * PARTS[PARTS.len() - 1].pow(2),
         ),
     }
 }

@@ -43,6 +43,7 @@ screendoor_trace::options! {
         Programs = "programs": "no publication's: fragments that four programs drew, under each design",
         Shadows = "shadows": "Enderton's shadow maps: figures 3 and 5, and visibility by every design that tells it",
         ScreenDoor = "screen-door": "Object-space screen-door transparency: opacity by angle, distance and size",
+        Costs = "costs": "costs as Enderton and Wyman print them: multiples of blending, depth peeling, views",
         Stability = "stability": "no publication's: hard cases with known truth, and correlations",
     }
 }

@@ -2,6 +2,7 @@
 
 pub mod beyond;
 pub mod claims;
+pub mod costs;
 pub mod examples;
 pub mod experiment;
 mod figures;

@@ -3,6 +3,7 @@
 use crate::study::comparison::{Comparison, compare, compare_slab};
 use crate::study::file::Publication;
 use crate::study::publications::beyond::{Beyond, beyond};
+use crate::study::publications::costs::{Costs, costs};
 use crate::study::publications::experiment::Lab;
 use crate::study::publications::methods::{Methods, methods};
 use crate::study::publications::programs::programs;
@@ -35,6 +36,8 @@ pub enum Reproduced {
     Shadows(Box<Shadows>),
     /// [`Publication::ScreenDoor`].
     ScreenDoor(Box<ScreenDoors>),
+    /// [`Publication::Costs`].
+    Costs(Box<Costs>),
     /// [`Publication::Stability`].
     Stability(Box<Stability>),
 }
@@ -52,6 +55,7 @@ impl Reproduced {
             Reproduced::Programs(_) => Publication::Programs,
             Reproduced::Shadows(_) => Publication::Shadows,
             Reproduced::ScreenDoor(_) => Publication::ScreenDoor,
+            Reproduced::Costs(_) => Publication::Costs,
             Reproduced::Stability(_) => Publication::Stability,
         }
     }
@@ -64,6 +68,7 @@ impl Reproduced {
             | Reproduced::Programs(_)
             | Reproduced::Shadows(_)
             | Reproduced::ScreenDoor(_)
+            | Reproduced::Costs(_)
             | Reproduced::Stability(_) => &[],
             Reproduced::Slab(c) | Reproduced::Comparison(c) => &c.missing,
             Reproduced::Beyond(b) | Reproduced::Splats(b) => &b.missing,
@@ -93,6 +98,7 @@ pub fn measure_publication(
             (lab.watch)("screen doors", 0, 1);
             Reproduced::ScreenDoor(Box::new(screen_doors()?))
         }
+        Publication::Costs => Reproduced::Costs(Box::new(costs(lab, effort)?)),
         Publication::Stability => {
             Reproduced::Stability(Box::new(stress_designs(16, |what, done, total| {
                 (lab.watch)(what, done, total);
