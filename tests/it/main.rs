@@ -41,3 +41,4 @@ mod util;
 mod view;
 mod visibility;
 mod vulkan;
+mod wyman;

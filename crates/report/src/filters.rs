@@ -11,6 +11,9 @@ pub(crate) const INTRODUCTION: &str = "Every finished picture was filtered as we
      filter trades noise for blur: what it does to the exact picture itself is its blur, an error that no \
      number of samples takes away.";
 
+/// An error below this, in 8-bit units, is hardly one: ratios to it say nothing.
+const LEAST: f64 = 0.05;
+
 /// The columns of [`rows`].
 pub(crate) const HEADER: [&str; 10] = [
     "design",
@@ -54,7 +57,7 @@ pub(crate) fn rows(results: &Results, scene: &str, samples: u32) -> Vec<[Text; 1
 }
 
 fn row(record: &Record, post: &PostFiltered) -> [Text; 10] {
-    let ratio = |after: Estimate, before: Estimate| match before.value > 0.0 {
+    let ratio = |after: Estimate, before: Estimate| match before.value >= LEAST {
         true => Text::plain(fixed(after.value / before.value, 3)),
         false => "—".into(),
     };

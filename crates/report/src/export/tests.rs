@@ -286,6 +286,15 @@ fn studies_that_are_shown_are_some() {
         (lit.scenes.len(), lit.scenes[11].name.as_str()),
         (12, "hair-merging-layers-8-8-16")
     );
+    for (name, text) in [
+        ("shadows", include_str!("../../../../workflow/shadows.toml")),
+        ("opacity", include_str!("../../../../workflow/opacity.toml")),
+        ("filters", include_str!("../../../../workflow/filters.toml")),
+    ] {
+        let study = Study::parse(text, name).unwrap();
+        let scenes = study.scenes.len();
+        assert!(scenes >= 3 && study.designs.len() >= 2, "{name}: {scenes}");
+    }
     let small = include_str!("../../../../workflow/small.toml");
     let small = Study::parse(small, "small.toml").unwrap();
     assert!(small.scenes.iter().all(|s| s.size == Some([64, 64])));

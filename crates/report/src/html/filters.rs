@@ -37,7 +37,7 @@ pub(super) fn section(content: &Content<'_>) -> Option<Markup> {
         h3 { "By region, and as a viewer sees it" }
         (figure("filters-table", &content.by_scene(table), &html! {
             "Ratios are errors with the filter over those without: over all covered pixels, those that no \
-             primitive's edge crosses, and the others."
+             primitive's edge crosses, and the others; — where there was less than 0.05 of 255 before."
         }, &content.study_command()))
     })
 }

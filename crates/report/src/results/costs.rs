@@ -2,6 +2,7 @@
 
 use crate::document::{Against, Agreement, Section};
 use crate::html::words::grouped;
+use crate::results::ratios::yes;
 use screendoor_study::study::publications::costs::{
     BASE, CostRow, Costs, FINAL, Growth, LAYERS, SAMPLES, SCENES, WymanTimes,
 };
@@ -20,10 +21,6 @@ fn ends(values: &[f64]) -> [f64; 2] {
 fn spread(values: &[f64]) -> String {
     let [low, high] = ends(values);
     format!("{:.2} [{low:.2}, {high:.2}]", geometric(values))
-}
-
-fn yes(holds: bool) -> &'static str {
-    if holds { "yes" } else { "no" }
 }
 
 fn row<'a>(c: &'a Costs, design: &str) -> Option<&'a CostRow> {

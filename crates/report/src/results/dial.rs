@@ -81,7 +81,7 @@ fn against(trial: &Trial) -> Against {
     let [first, .., last] = DIAL;
     Against {
         section: "SLAB's dial".to_string(),
-        source: "Wyman 2016, introduction and section 2".to_string(),
+        source: "Wyman 2016, abstract and section 2.1".to_string(),
         printed: "The number of coverage bits b trades noise for bias: from n, the number of \
                   layers, where SLAB is stochastic transparency, to infinity, where it is the \
                   k-buffer."

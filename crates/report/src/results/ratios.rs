@@ -97,6 +97,11 @@ impl Holding {
     }
 }
 
+/// Whether something holds, in a word.
+pub(super) fn yes(holds: bool) -> &'static str {
+    if holds { "yes" } else { "no" }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -2,6 +2,7 @@
 
 use crate::document::{Against, Agreement, Section};
 use crate::results::figures::show;
+use crate::results::ratios::yes;
 use screendoor_study::study::publications::screen_door::{
     ALPHA, ANGLES, BINS, ByAngle, DISTANCES, Layers, PARTS, ScreenDoors,
 };
@@ -33,7 +34,6 @@ fn by_angle_against(s: &ScreenDoors) -> Against {
         ordered,
     ];
     let said = |[front, turned]: [f64; 2]| format!("{front:.3} to {turned:.3}");
-    let holds = |holds: bool| if holds { "yes" } else { "no" };
     Against {
         section: "Object-space screen door".to_string(),
         source: format!("{SOURCE}, sections 3 and 5, figure 1"),
@@ -55,10 +55,10 @@ fn by_angle_against(s: &ScreenDoors) -> Against {
              surface faces the viewer: an even grid that does not lie on the pixels leaves some without a point. \
              Masks keep it on large triangles alone: of a square in {triangles} triangles, which all begin at the \
              same texel, {cut:.3} is opaque in place of {whole:.3}.",
-            holds(statements[0]),
-            holds(statements[1]),
-            holds(statements[2]),
-            holds(statements[3]),
+            yes(statements[0]),
+            yes(statements[1]),
+            yes(statements[2]),
+            yes(statements[3]),
             triangles = 2 * PARTS[PARTS.len() - 1].pow(2),
         ),
     }
@@ -146,10 +146,6 @@ fn layers_against(s: &ScreenDoors) -> Against {
             yes(statements[3])
         ),
     }
-}
-
-fn yes(holds: bool) -> &'static str {
-    if holds { "yes" } else { "no" }
 }
 
 /// The section of layers.

@@ -73,7 +73,7 @@ fn against(c: &Comparison) -> Against {
     let won = |antialiased: bool| {
         range(duels.iter().filter(|d| d.antialiased == antialiased).map(|d| d.won(CLAIMED)))
     };
-    // As both publications show theirs: without antialiasing.
+    // As Enderton et al. show figures 2 and 4: without antialiasing.
     let shown = duels.iter().filter(|d| !d.antialiased);
     let statements: Vec<bool> = shown
         .flat_map(|d| {
@@ -101,7 +101,7 @@ fn against(c: &Comparison) -> Against {
         agreement: Agreement::of(&statements),
         remark: format!(
             "It holds in {} of {} pairs of normalisation and scene without antialiasing, which is \
-             how both publications show their pictures.",
+             how Enderton et al. show figures 2 and 4.",
             statements.iter().filter(|holds| **holds).count(),
             statements.len()
         ),
