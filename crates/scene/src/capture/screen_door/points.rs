@@ -22,7 +22,8 @@ impl Points {
         let area = (b - a).cross(c - a).length() / 2.0;
         let per_area = self.per_area.unwrap_or_else(|| pixels_per_unit(triangle, camera).powi(2));
         let count = area * per_area;
-        if count.is_finite() { count } else { 0.0 }
+        // What has no area has no points, however near.
+        if count.is_nan() { 0.0 } else { count }
     }
 
     /// Draws the points that are opaque, each as one pixel. What is opaque itself is drawn as it is

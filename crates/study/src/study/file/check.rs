@@ -169,7 +169,9 @@ impl SceneEntry {
             return refused("a shadow and no light", "add light = 'key', say");
         }
         shadow.check().map_err(|e| {
-            Error::config(format_args!("the shadow of scene '{name}': {e}"), "correct it")
+            let text = e.to_string();
+            let (what, hint) = text.rsplit_once("; ").unwrap_or((&text, "correct it"));
+            Error::config(format_args!("the shadow of scene '{name}': {what}"), hint)
         })
     }
 }

@@ -168,6 +168,7 @@ fn shadows_that_cannot_be_are_refused() {
     ] {
         let wrong = Study::parse(&with_shadow(keys), "a.toml").unwrap_err().to_string();
         assert!(wrong.contains(says), "{keys}: {wrong}");
+        assert!(wrong.matches("correct it").count() <= 1, "{wrong}");
     }
     let refused = |change: (&str, &str)| {
         let text = with_shadow("design = 'lk'").replace(change.0, change.1);

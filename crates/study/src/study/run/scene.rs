@@ -94,14 +94,20 @@ struct Drawn {
 fn draw(store: &Store, entry: &SceneEntry, base: &Path, path: &Path) -> Result<Drawn> {
     let (mut scene, options) = prepared(entry, base)?;
     let capture = Capture::new(&scene, &options)?;
+    let mut dark = false;
     let (rows, shadow) = match &entry.shadow {
         None => (put_trace(path, capture.header(), |w| capture.draw(w, |_, _| ()))?, None),
         Some(shadow) => {
             let (rows, facts) = shaded(store, entry, shadow, (&scene, &capture), path)?;
+            dark = facts.error.queries == 0;
             (rows, Some(facts))
         }
     };
     drop(capture);
+    if dark {
+        let lacks = format!("{}: no fragment has anything of the light's", entry.name);
+        scene.warnings.push(lacks);
+    }
     if rows == 0 {
         scene.warnings.push(format!("{}: its trace has no fragments", entry.name));
     }
