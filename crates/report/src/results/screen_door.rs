@@ -51,14 +51,17 @@ fn by_angle_against(s: &ScreenDoors) -> Against {
         agreement: Agreement::of(&statements),
         remark: format!(
             "Points rise towards silhouettes: {}; masks do not: {}; with the max filter they do: {}; all \
-             screen doors give the same fragments in another order: {}. Points do not keep α where a \
-             surface faces the viewer: an even grid that does not lie on the pixels leaves some without a point. \
+             screen doors give the same fragments in another order: {}. Points keep α where a surface faces \
+             the viewer if their even grid lies on the pixels; one that does not leaves some without a point: on the \
+             ball up to {near}° {ball:.3} is opaque. \
              Masks keep it on large triangles alone: of a square in {triangles} triangles, which all begin at the \
              same texel, {cut:.3} is opaque in place of {whole:.3}.",
             yes(statements[0]),
             yes(statements[1]),
             yes(statements[2]),
             yes(statements[3]),
+            near = BINS[1],
+            ball = door(s, "points").map_or(f64::NAN, |by| by.ball[0]),
             triangles = 2 * PARTS[PARTS.len() - 1].pow(2),
         ),
     }

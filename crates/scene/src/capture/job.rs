@@ -118,7 +118,7 @@ impl Drawn {
                 if let Some(door) = &tools.door {
                     door.cut(triangle, &raster, tools.shader.camera, (fragments, from));
                     if door.place_of_points(pieces, tools) == Some((part.piece, part.rows.0)) {
-                        door.add_points(triangle, tools, fragments);
+                        door.add_points((triangle, pieces), tools, fragments);
                     }
                 }
             }

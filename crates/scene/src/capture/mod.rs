@@ -219,7 +219,7 @@ impl<'a> Capture<'a> {
             header.source.push_str(&format!(", light {}", light.spec()));
         }
         if let Some(door) = options.screen_door {
-            Door::new(door, scene).check(scene, &camera)?;
+            screen_door::check(scene)?;
             header.source.push_str(&format!(", screen door {}", door.spec()));
         }
         let shader = Shader::new(scene, &camera, options, space);
@@ -227,7 +227,9 @@ impl<'a> Capture<'a> {
             header.constants.insert(ColumnId::Alpha, Scalar::Real(alpha));
         }
         let recorded = Recorded::new(scene.objects.len());
-        Ok(Capture { scene, options, camera, header, recorded })
+        let capture = Capture { scene, options, camera, header, recorded };
+        capture.check_points()?;
+        Ok(capture)
     }
 
     /// The header of the trace that the capture makes.

@@ -160,6 +160,14 @@ impl<'a> Raster<'a> {
         self.hit([x, y], self.edges.map(|e| e.at(centre)), coverage)
     }
 
+    /// What it leaves in pixel `[x, y]`, if anything.
+    pub(super) fn touched(&self, pixel: [i64; 2]) -> Option<Hit> {
+        let centre = pixel.map(|v| v * STEPS + STEPS / 2);
+        let values = self.edges.map(|e| e.at(centre));
+        let coverage = self.coverage(values);
+        (!coverage.is_empty()).then(|| self.hit(pixel, values, coverage))
+    }
+
     /// `values` are the edges' at the pixel's centre.
     fn hit(&self, pixel: [i64; 2], values: [i64; 3], coverage: SampleMask) -> Hit {
         let centre = pixel.map(|v| v * STEPS + STEPS / 2);

@@ -84,6 +84,16 @@ impl<'a> Shader<'a> {
         &self.scene.materials[index]
     }
 
+    /// Whether any fragment of this material may have an alpha below 1.
+    pub(super) fn may_let_through(&self, index: usize) -> bool {
+        let material = self.material(index);
+        let own = match self.alpha {
+            Some(alpha) => alpha < 1.0,
+            None => material.transmission > 0.0,
+        };
+        own || self.opacity.varies() || material.alpha_mode == AlphaMode::Blend
+    }
+
     /// The one alpha that every fragment of the scene has, if there is one.
     pub(super) fn constant_alpha(&self) -> Option<f32> {
         if self.cut {

@@ -7,13 +7,17 @@ mod points;
 #[cfg(test)]
 mod tests;
 
+use glam::DVec3;
+use rayon::prelude::*;
+
+use crate::capture::Capture;
 use crate::capture::camera::Camera;
 use crate::capture::geometry::{Geometry, Primitive, Triangle};
 use crate::capture::job::Tools;
 use crate::capture::model::Model;
 use crate::capture::raster::Raster;
 use crate::capture::screen_door::masks::{Mask, Stipple};
-use crate::capture::screen_door::points::Points;
+use crate::capture::screen_door::points::{MOST_POINTS, Points};
 use crate::capture::setup::Pieces;
 use crate::scene::Scene;
 use screendoor_trace::error::{Error, Result};
@@ -132,9 +136,6 @@ pub(super) enum Door {
     Stipple(Stipple),
 }
 
-/// Points that a triangle may have at most.
-const MOST_POINTS: f64 = (1 << 24) as f64;
-
 impl Door {
     pub(super) fn new(door: ScreenDoor, scene: &Scene) -> Self {
         match door {
@@ -145,32 +146,6 @@ impl Door {
             ScreenDoor::Mask { seed, max } => Door::Mask(Mask { seed, max }),
             ScreenDoor::Stipple { seed, patterns } => Door::Stipple(Stipple::new(seed, patterns)),
         }
-    }
-
-    /// Refuses what it cannot cut, and triangles of more points than anybody waits for.
-    pub(super) fn check(&self, scene: &Scene, camera: &Camera) -> Result<()> {
-        if scene.has_splats() {
-            return Err(Error::config(
-                "splats have no surface that a screen door could be cut into",
-                "leave the screen door out",
-            ));
-        }
-        let Door::Points(points) = self else { return Ok(()) };
-        let geometry = Geometry::new(scene, camera);
-        for number in 0..geometry.len() {
-            let Primitive::Triangle(triangle) = geometry.primitive(number) else { continue };
-            let count = points.count(&triangle, camera);
-            if count > MOST_POINTS {
-                return Err(Error::config(
-                    format_args!(
-                        "primitive {number} ('{}') would have {count:.0} points",
-                        scene.objects[triangle.object as usize].name
-                    ),
-                    "look from further away, or at a smaller frame; 'mask' has no such limit",
-                ));
-            }
-        }
-        Ok(())
     }
 
     /// Cuts the fragments from the place `from` on, of a piece of a triangle: what lets light through
@@ -212,12 +187,12 @@ impl Door {
     /// Adds the points of a triangle, all at once.
     pub(super) fn add_points(
         &self,
-        triangle: &Triangle,
+        (triangle, pieces): (&Triangle, &Pieces),
         tools: &Tools<'_>,
         fragments: &mut Vec<Fragment>,
     ) {
         if let Door::Points(points) = self {
-            points.draw(triangle, tools, fragments);
+            points.draw(triangle, pieces, tools, fragments);
         }
     }
 
@@ -232,6 +207,42 @@ impl Door {
         let rows = pieces.iter().map(|piece| tools.raster(piece).rows());
         let mut on_frame = rows.enumerate().filter(|(_, (first, last))| first <= last);
         on_frame.next().map(|(piece, (first, _))| (piece, first))
+    }
+}
+
+/// Refuses scenes that have no surface to cut.
+pub(super) fn check(scene: &Scene) -> Result<()> {
+    if scene.has_splats() {
+        return Err(Error::config(
+            "splats have no surface that a screen door could be cut into",
+            "leave the screen door out",
+        ));
+    }
+    Ok(())
+}
+
+impl Capture<'_> {
+    /// Refuses triangles of more points than anybody waits for, of those that are drawn with points.
+    pub(super) fn check_points(&self) -> Result<()> {
+        let Some(ScreenDoor::Points { .. }) = self.options.screen_door else { return Ok(()) };
+        let tools = self.tools();
+        let Some(door @ Door::Points(points)) = &tools.door else { return Ok(()) };
+        let geometry = Geometry::new(self.scene, &self.camera);
+        let refused = (0..geometry.len()).into_par_iter().find_map_first(|number| {
+            let Primitive::Triangle(triangle) = geometry.primitive(number) else { return None };
+            let count = points.count(&triangle, &self.camera);
+            if count <= MOST_POINTS || !tools.shader.may_let_through(triangle.material) {
+                return None;
+            }
+            let pieces = self.set_up(&triangle, &tools.shader);
+            door.place_of_points(&pieces, &tools).map(|_| (number, triangle.object, count))
+        });
+        let Some((number, object, count)) = refused else { return Ok(()) };
+        let name = &self.scene.objects[object as usize].name;
+        Err(Error::config(
+            format_args!("primitive {number} ('{name}') would have {count:.0} points"),
+            "look from further away, or at a smaller frame; 'mask' has no such limit",
+        ))
     }
 }
 
@@ -254,14 +265,11 @@ fn pixels_per_unit(triangle: &Triangle, camera: &Camera) -> f64 {
     if camera.eye.is_none() {
         return focal;
     }
+    let ahead = |p: DVec3| Some(camera.seen(p).z).filter(|z| *z > 0.0 && camera.depth(*z) >= 0.0);
     let [a, b, c] = triangle.vertices.map(|v| v.position);
-    let distance = camera.seen((a + b + c) / 3.0).z;
-    // A middle behind the viewer: the nearest corner before them counts.
-    let nearest = || {
-        let corners = [a, b, c].map(|p| camera.seen(p).z);
-        corners.into_iter().filter(|z| *z > 0.0).fold(f64::INFINITY, f64::min)
-    };
-    focal / if distance > 0.0 { distance } else { nearest() }
+    // A middle that is not before the near plane: the nearest corner that is counts.
+    let nearest = || [a, b, c].into_iter().filter_map(ahead).fold(f64::INFINITY, f64::min);
+    focal / ahead((a + b + c) / 3.0).unwrap_or_else(nearest)
 }
 
 /// A random number in 0 to 1, 1 excluded.
